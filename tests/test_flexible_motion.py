@@ -27,18 +27,15 @@ def swinging(**options):
 # --- statics --------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("load", "y"), [(1, 0.30172), (2, 0.49346), (5, 0.71379), (10, 0.81061)])
-def test_elastica_of_bisshopp_and_drucker(load, y):
-    found = flexible.elastica(2.0, 3.0, force=load * 3.0 / 4.0)
-    assert found.tip[1, 3] / 2.0 == pytest.approx(y, abs=2e-5)
-    # the first integral of the equation: the lever of the force
-    assert found.tip[0, 3] / 2.0 == pytest.approx(np.sqrt(2.0 * np.sin(found.angle[-1]) / load))
-    steps = np.linalg.norm(np.diff(found.points, axis=0), axis=1)
-    assert steps.sum() == pytest.approx(2.0, rel=1e-4)
-
-
-def test_a_moment_bends_a_beam_to_a_circle():
-    found = flexible.elastica(2.0, 3.0, moment=2 * np.pi * 3.0 / 2.0)
+def test_elastica_of_bisshopp_and_drucker():
+    for load, y in ((1, 0.30172), (2, 0.49346), (5, 0.71379), (10, 0.81061)):
+        found = flexible.elastica(2.0, 3.0, force=load * 3.0 / 4.0)
+        assert found.tip[1, 3] / 2.0 == pytest.approx(y, abs=2e-5)
+        # the first integral of the equation: the lever of the force
+        assert found.tip[0, 3] / 2.0 == pytest.approx(np.sqrt(2.0 * np.sin(found.angle[-1]) / load))
+        steps = np.linalg.norm(np.diff(found.points, axis=0), axis=1)
+        assert steps.sum() == pytest.approx(2.0, rel=1e-4)
+    found = flexible.elastica(2.0, 3.0, moment=2 * np.pi * 3.0 / 2.0)  # bent to a circle
     np.testing.assert_allclose(found.tip, np.eye(4), atol=1e-9)
     assert found.angle[-1] == pytest.approx(2 * np.pi)
     mirrored = flexible.elastica(1.0, 1.0, force=-2.0, moment=0.5)
@@ -65,13 +62,9 @@ def test_equilibrium_is_where_nothing_accelerates(rng):
     found = flexible.static_deflection(arm, q, w)
     a, ea = flexible.ddm(arm, q, found.e, 0 * q, None, found.tau, w)  # offsets included
     assert max(np.abs(a).max(), np.abs(ea).max()) < 1e-6
-
-
-def test_a_beam_pushed_beyond_its_load_of_buckling_is_unstable():
-    arm = swinging(stiffening=True)
-    euler = np.pi**2 * 9.0 / 4.0
-    loads = np.array([0.99, 1.01])[:, None] * np.array([euler, 0, 0, 0, 0, 0])
-    found = flexible.static_deflection(arm, [0.0], loads)
+    # beyond the load of buckling by Euler it is unstable
+    loads = np.array([[0.99], [1.01]]) * np.pi**2 * 9.0 / 4.0 * np.eye(6)[0]
+    found = flexible.static_deflection(swinging(stiffening=True), [0.0], loads)
     assert found.status.tolist() == [DeflectionStatus.SMALL, DeflectionStatus.UNSTABLE]
 
 
@@ -112,14 +105,13 @@ def test_zeros_of_the_hub_are_the_clamped_frequencies():
 
 def test_zeros_of_the_tip_lie_in_the_right_half_plane():
     exact = 4 * brentq(lambda x: np.tan(x) + np.tanh(x), 2.0, 2.9) ** 4  # EI / (rho L^4) = 1
-    for modes in (1, 2):
+    for modes in (1, 2, 6):
         beam = flexible.beam(1.0, EI=(INF, 1.0), hub=0.1, modes=modes)
         arm = flexible.FlexibleRobot(PIVOT, {1: beam})
         squared = flexible.linearize(arm, [0.0], "tip").zeros ** 2
-        assert (np.abs(squared.imag) < 1e-9).all()
-        assert (squared.real > 0.0).all()
-    arm = flexible.FlexibleRobot(PIVOT, {1: flexible.beam(1.0, EI=(INF, 1.0), hub=0.1, modes=6)})
-    squared = flexible.linearize(arm, [0.0], "tip").zeros ** 2
+        if modes < 3:
+            assert (np.abs(squared.imag) < 1e-9).all()
+            assert (squared.real > 0.0).all()
     real = squared.real[np.abs(squared.imag) < 1e-6]
     assert real[real > 0].min() == pytest.approx(exact, rel=1e-3)
 
@@ -293,16 +285,19 @@ def test_shapers_have_their_closed_forms():
     np.testing.assert_allclose(stairs, [0.25, 0.75, 1.0])
 
 
-def test_regulation_ends_at_the_goal_under_gravity():
-    model = PIVOT.with_gravity((0, -9.81, 0))
-    arm = flexible.FlexibleRobot(
-        model, {1: flexible.beam(1.0, (INF, 30.0), hub=0.1)}, modal_damping=0.05
-    )
+def test_laws_of_the_joints_end_at_the_goal_and_decay_as_given():
+    beam = flexible.beam(1.0, (INF, 30.0), hub=0.1)
+    arm = flexible.FlexibleRobot(PIVOT.with_gravity((0, -9.81, 0)), {1: beam}, modal_damping=0.05)
     rest = flexible.static_deflection(arm, [0.0]).e
     law = flexible.regulator(arm, 20.0, 8.0, [0.5])
     run = flexible.simulate(arm, [0.0], control=law, t=6.0, e0=rest, rtol=1e-7)
     assert abs(run.q[-1, 0] - 0.5) < 1e-4
     np.testing.assert_allclose(run.e[-1], flexible.static_deflection(arm, [0.5]).e, atol=1e-5)
+    arm, motion = swinging(stiffening=True), rm.trajectories.quintic([0.0], [1.0], duration=1.0)
+    law, t = flexible.joint_tracking(arm, motion, 100.0, 20.0), np.linspace(0.0, 1.0, 21)
+    run = flexible.simulate(arm, [0.1], control=law, t=t)
+    error = run.q[:, 0] - motion.q(t)[:, 0]
+    np.testing.assert_allclose(error, 0.1 * (1 + 10 * t) * np.exp(-10 * t), atol=1e-7)
 
 
 @pytest.mark.parametrize("kind", ["link", "joint"])
@@ -321,29 +316,14 @@ def test_motion_from_rest_to_rest_leaves_no_vibration(kind):
     plan = flexible.rest_to_rest(arm, [0.0], [1.0], 0.7)
     assert plan.status == RestStatus.AT_REST
     t = np.array([0.0, 0.35, 0.7, 1.2])
+    start, exact = plan.elastic(0.0)[0], {"rtol": 1e-12, "atol": 1e-14}
     run = flexible.simulate(
-        arm,
-        [0.0],
-        control=lambda t, q, v: plan.torque(t),
-        t=t,
-        e0=plan.elastic(0.0)[0],
-        rtol=1e-12,
-        atol=1e-14,
+        arm, [0.0], control=lambda t, q, v: plan.torque(t), t=t, e0=start, **exact
     )
     peak = np.abs(plan.elastic(np.linspace(0, 0.7, 99))[0] - plan.elastic(0.7)[0]).max(axis=0)
     assert np.abs(run.q[2:] - 1.0).max() < 1e-8
     assert (np.abs(run.e[2:] - plan.elastic(0.7)[0]) < 1e-8 * peak).all()
     assert plan.torque(t).shape == (4, 1)
-
-
-def test_joint_tracking_follows_with_the_given_decay():
-    arm = swinging(stiffening=True)
-    motion = rm.trajectories.quintic([0.0], [1.0], duration=1.0)
-    law = flexible.joint_tracking(arm, motion, 100.0, 20.0)
-    t = np.linspace(0.0, 1.0, 21)
-    run = flexible.simulate(arm, [0.1], control=law, t=t)
-    error = run.q[:, 0] - motion.q(t)[:, 0]
-    np.testing.assert_allclose(error, 0.1 * (1 + 10 * t) * np.exp(-10 * t), atol=1e-7)
 
 
 def test_tip_is_tracked_with_preview_and_causal_inversion_is_refused():

@@ -67,18 +67,6 @@ def test_a_parallelogram_robot_of_symoro(read):
     assert len(rm.base_parameters(robot.tree, drive=("Ia",))) == 55
 
 
-def test_par_files_that_are_no_looped_robots(read):
-    tree = SR400.replace("NJ = 9", "NJ = 8").replace("NF = 10", "NF = 10")
-    with pytest.raises(ParFileError):
-        read(tree, loops.read_par, values=LENGTHS)
-    with pytest.raises(ParFileError, match="second frame"):
-        read(SR400.replace("NF = 10", "NF = 9"), loops.read_par, values=LENGTHS)
-    with pytest.raises(ParFileError, match=r"loops\.read_par"):
-        read(SR400, rm.read_par, values=LENGTHS)
-    with pytest.raises(LoopError, match="cannot read"):
-        loops.read_mjcf("none.xml")
-
-
 def test_mjcf_with_one_and_with_two_root_bodies(read):
     robot = read(FOUR_BAR, loops.read_mjcf, name="bars.xml")
     assert robot.name == "bars"
@@ -114,11 +102,15 @@ def test_mjcf_with_one_and_with_two_root_bodies(read):
         ('<joint name="j3" axis="0 0 1"/>', '<freejoint name="j3"/>', "'j3' is a"),
         ('body2="rocker"', 'body2="nobody"', "nobody"),
         (' anchor="0.7 0 0"', "", "anchor with 3 numbers"),
+        ("NF = 10", "NF = 9", "second frame"),
     ],
 )
-def test_mjcf_files_that_are_refused_by_name(read, old, new, words):
-    with pytest.raises(LoopError, match=words):
-        read(FOUR_BAR.replace(old, new), loops.read_mjcf, name="bars.xml")
+def test_files_that_are_refused_by_name(read, old, new, words):
+    reader, text = (loops.read_mjcf, FOUR_BAR) if old in FOUR_BAR else (loops.read_par, SR400)
+    with pytest.raises((LoopError, ParFileError), match=words):
+        read(text.replace(old, new), reader, **({} if text is FOUR_BAR else {"values": LENGTHS}))
+    with pytest.raises(ParFileError, match=r"loops\.read_par"):
+        read(SR400, rm.read_par, values=LENGTHS)
 
 
 def test_mjcf_equalities_keep_their_order_and_inactive_ones_are_none(read):

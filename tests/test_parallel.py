@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from robotmodels import parallel as pr
-from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
+from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.parallel import kernels_homotopy
 
 TURN = np.deg2rad([-90.0, 30.0, 150.0])
@@ -36,6 +36,7 @@ ROBOTS = {
     "five-bar": pr.five_bar([[-0.2, 0.0], [0.2, 0.05]], [0.4, 0.45], [0.6, 0.55]),
     "delta": pr.delta(0.164 * RING, 0.044 * RING, TURN, 0.524, 1.244),
 }
+GOOD = ROBOTS["SSM"]
 DIETMAIER = (
     [
         [0, 0, 0], [1.107915, 0, 0], [0.549094, 0.756063, 0], [0.735077, -0.223935, 0.525991],
@@ -94,6 +95,13 @@ def test_every_mode_comes_back_from_the_direct_models(name):
         assert away.min(axis=1).max() < 1e-11
         assert np.nanmax(modes.residual) < 1e-12
         assert (modes.status == pr.AssemblyStatus.ALL).all()
+        shaped = pr.assembly_modes(robot, q.reshape(2, 3, -1).tolist())
+        np.testing.assert_array_equal(shaped.T, modes.T.reshape(2, 3, *modes.T.shape[1:]))
+    for result in (robot, legs, modes, near):
+        assert pickle.loads(pickle.dumps(result)) == result
+        assert len(repr(result).splitlines()) <= 6
+    assert pr.inverse_jacobian(robot, T[:0]).shape == (0, robot.m, 6)
+    assert pr.assembly_modes(robot, legs.q[:0, 0]).count.shape == (0,)
 
 
 def test_delta_of_the_flexpicker():
@@ -163,16 +171,13 @@ def test_limits_and_reach_are_statuses():
     # angles count modulo whole turns
     turned = pr.five_bar([[-0.2, 0], [0.2, 0]], 0.4, 0.6, lower=np.pi, upper=4 * np.pi)
     assert pr.igm(turned, turned.home).within_limits.all()
-
-
-def test_a_straight_leg_counts_once():
+    # a straight leg counts once
     robot = pr.five_bar([[-0.2, 0.0], [0.2, 0.0]], [0.4, 0.4], [0.6, 0.8])
-    place = robot.base[0, :2] + [0.6, 0.8]  # 0.4 + 0.6 from the first axis
-    legs = pr.igm(robot, robot.pose(place))
-    assert legs.count == 2
-    assert pr.classify_singularity(robot, robot.pose(place)).kind == pr.SingularityKind.SERIAL
+    T = robot.pose(robot.base[0, :2] + [0.6, 0.8])  # 0.4 + 0.6 from the first axis
+    assert pr.igm(robot, T).count == 2
+    assert pr.classify_singularity(robot, T).kind == pr.SingularityKind.SERIAL
     with pytest.raises(InvalidValueError, match="leg 1 is straight"):
-        pr.inverse_jacobian(robot, robot.pose(place))
+        pr.inverse_jacobian(robot, T)
 
 
 # --- assembly modes ------------------------------------------------------------------------------
@@ -288,21 +293,17 @@ def test_robots_that_move_with_locked_legs_are_degenerate():
     assert pr.assembly_modes(octahedron, q + 0.01 * np.arange(6)).complex_count == 16
 
 
-INNOCENTI = (17.04, 16.54, 20.84)
-
-
 def test_six_modes_of_the_planar_robot_of_innocenti():
     """C. Innocenti and V. Parenti-Castelli, "Singularity-free evolution from one configuration to
     another in serial and fully-parallel manipulators", J. of Mechanical Design 120 (1998)."""
-    a, b, c = INNOCENTI
+    a, b, c = 17.04, 16.54, 20.84
     x = (a * a + c * c - b * b) / (2 * a)
     robot = pr.planar_3rpr(
         [[0, 0], [15.91, 0], [0, 10]], [[0, 0], [a, 0], [x, np.sqrt(c * c - x * x)]]
     )
     q = [14.98, 15.38, 12.0]
     modes = pr.assembly_modes(robot, q)
-    assert modes.count == 6
-    assert np.sign(modes.det).sum() == 0
+    assert (modes.count, np.sign(modes.det).sum()) == (6, 0)
     assert (np.diff(robot.coordinates(modes.T)[:, 2]) > 0).all()
     assert leg_errors(robot.base, robot.platform, modes.T, q).max() < 1e-12
 
@@ -348,10 +349,9 @@ def test_similar_triangles_have_at_most_four_modes():
     assert pr.assembly_modes(equal, [1.0] * 3).status == pr.AssemblyStatus.DEGENERATE
 
 
-@pytest.mark.parametrize("pair", [[0, 0, 1], [0, 1, 1], [0, 1, 0]])
-def test_anchors_that_two_planar_legs_share_leave_four_solutions(pair):
+def test_planar_robots_of_special_geometry():
     rng = np.random.default_rng(3)
-    for _ in range(5):
+    for pair in ([0, 0, 1], [0, 1, 1], [0, 1, 0]):  # anchors that two legs share
         base, platform = rng.normal(size=(2, 3, 2))
         for robot in (
             pr.planar_3rpr(base[pair], platform),
@@ -362,15 +362,10 @@ def test_anchors_that_two_planar_legs_share_leave_four_solutions(pair):
             modes = pr.assembly_modes(robot, pr.igm(robot, T).q[0])
             assert modes.complex_count == 4
             assert np.abs(modes.T - T).max(axis=(-1, -2)).min() < 1e-8
-
-
-def test_solutions_of_equal_orientation_are_both_listed():
     # base and platform on lines: mirrored pairs, one of them with equal orientation
     robot = pr.planar_3rpr([[0, 0], [1, 0], [3, 0]], [[0, 0], [0.5, 0], [0.9, 0]])
-    T = robot.pose([0.4, 1.1, 0.0])
-    modes = pr.assembly_modes(robot, pr.igm(robot, T).q[0])
-    mirrored = robot.pose([0.4, -1.1, 0.0])
-    for pose in (T, mirrored):
+    modes = pr.assembly_modes(robot, pr.igm(robot, robot.pose([0.4, 1.1, 0.0])).q[0])
+    for pose in robot.pose([[0.4, 1.1, 0.0], [0.4, -1.1, 0.0]]):
         assert np.abs(modes.T - pose).max(axis=(-1, -2)).min() < 1e-9
 
 
@@ -412,58 +407,26 @@ def test_jacobians_are_derivatives_in_every_mode(name):
         np.testing.assert_allclose(pr.dkm_second_order(robot, T, rates, second, mode), A, atol=1e-9)
 
 
-# --- batches and mistakes ------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ["SSM", "3-RRR", "delta"])
-def test_batches_of_any_shape_and_empty_ones(name):
-    robot = ROBOTS[name]
-    T = poses_near_home(robot, 6).reshape(2, 3, 4, 4)
-    legs = pr.igm(robot, T.tolist())
-    q = legs.q[..., 0, :]
-    modes, near = pr.assembly_modes(robot, q), pr.dgm(robot, q)
-    assert modes.T.shape[:2] == near.T.shape[:2] == modes.status.shape == (2, 3)
-    single = pr.assembly_modes(robot, q[1, 2])
-    np.testing.assert_array_equal(single.T, modes.T[1, 2, : single.T.shape[0]])
-    for result in (robot, legs, modes, near):
-        assert pickle.loads(pickle.dumps(result)) == result
-        assert len(repr(result).splitlines()) <= 6
-    none = np.empty((0, 4, 4))
-    assert pr.inverse_jacobian(robot, none).shape == (0, robot.m, 6)
-    assert pr.assembly_modes(robot, none[:, 0, :1] * np.ones(robot.m)).count.shape == (0,)
-    assert pr.ikm(robot, T, twists(robot, 1)[0]).shape == (2, 3, robot.m)
-
-
-GOOD = ROBOTS["SSM"]
+# --- mistakes ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("call", "error", "words"),
+    ("call", "words"),
     [
-        (lambda: pr.gough(GOOD.base[:5], GOOD.platform[:5]), ShapeError, "6 points"),
-        (lambda: pr.gough(GOOD.base, GOOD.platform[[0, 0, 0, 0, 0, 0]]), InvalidValueError, "all"),
+        (lambda: pr.gough(GOOD.base, GOOD.platform[[0, 0, 0, 0, 0, 0]]), "all"),
+        (lambda: pr.gough(GOOD.base[:5], GOOD.platform[:5]), "6 points"),
         (lambda: pr.gough(GOOD.base[[0, 0, 1, 2, 3, 4]], GOOD.platform[[0, 0, 1, 2, 3, 4]]),
-         InvalidValueError, "legs 1 and 2"),
-        (lambda: pr.gough(GOOD.base, GOOD.platform, lower=-1), InvalidValueError, "not negative"),
-        (lambda: pr.gough(GOOD.base, GOOD.platform, 2, 1), InvalidValueError, "lower below upper"),
-        (lambda: pr.five_bar([[0, 0], [1, 0]], -1, 1), InvalidValueError, "above 0"),
-        (lambda: pr.gough_symmetric(1.0, kind="XSM"), InvalidValueError, "SSM, TSSM, MSSM"),
-        (lambda: pr.assembly_modes(GOOD, [1, 1, 1, 1, 1, -1.0]), InvalidValueError, "negative"),
-        (lambda: pr.igm(GOOD, 2.0 * np.eye(4)), NotARotationError, "rotation|last row"),
-        (lambda: pr.igm(ROBOTS["delta"], GOOD.pose([0, 0, -1, 0.1, 0, 0])), InvalidValueError,
+         "legs 1 and 2"),
+        (lambda: pr.gough(GOOD.base, GOOD.platform, 2, 1), "lower below upper"),
+        (lambda: pr.assembly_modes(GOOD, [1, 1, 1, 1, 1, -1.0]), "negative"),
+        (lambda: pr.igm(ROBOTS["delta"], GOOD.pose([0, 0, -1, 0.1, 0, 0])),
          "translates only"),
-        (lambda: pr.igm(ROBOTS["3-RPR"], GOOD.home), InvalidValueError, "plane"),
-        (lambda: pr.igm("robot", np.eye(4)), InvalidValueError, "parallel.gough"),
+        (lambda: pr.igm(ROBOTS["3-RPR"], GOOD.home), "plane"),
         (lambda: pr.inverse_jacobian(ROBOTS["delta"], ROBOTS["delta"].pose([9, 0, 0])),
-         InvalidValueError, "out of reach"),
-        (lambda: GOOD.with_masses(5.0), ShapeError, "two parts"),
-        (lambda: pr.workspace(GOOD, kind="round"), InvalidValueError, "orientation, dexterous"),
-        (lambda: pr.workspace(GOOD, limits=False), InvalidValueError, "unlimited"),
-        (lambda: pr.workspace(GOOD, limits=(0.5, 1.2), resolution=1.5), InvalidValueError,
-         "resolution: expected"),
-        (lambda: pr.workspace(GOOD, orientation=np.eye(2)), ShapeError, "orientation"),
+         "out of reach"),
+        (lambda: pr.workspace(GOOD, limits=False), "unlimited"),
     ],
 )  # fmt: skip
-def test_mistakes_say_what_to_do(call, error, words):
-    with pytest.raises(error, match=words):
+def test_mistakes_say_what_to_do(call, words):
+    with pytest.raises((InvalidValueError, ShapeError), match=words):
         call()

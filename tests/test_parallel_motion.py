@@ -1,13 +1,12 @@
 """Parallel robots: statics, singular positions, workspaces, dynamics, loops, calibration."""
 
 import pickle
-from functools import partial
 
 import looped_robots
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from test_parallel import ROBOTS, moved, poses_near_home, twists
+from test_parallel import GOOD, RING, ROBOTS, TURN, moved, poses_near_home, twists
 
 from robotmodels import parallel as pr
 from robotmodels import performance, viz
@@ -18,7 +17,12 @@ from robotmodels.kinematics import dgm
 from robotmodels.loops import Closure, LoopedRobot
 from robotmodels.model import RobotModel
 from robotmodels.parallel import SingularityKind as Kind
-from robotmodels.parallel.workspace import measure
+
+
+def leg_directions(robot, T):
+    d = robot.platform @ np.swapaxes(T[:, :3, :3], 1, 2) + T[:, None, :3, 3] - robot.base
+    return d / np.linalg.norm(d, axis=-1, keepdims=True)
+
 
 # --- statics -------------------------------------------------------------------------------------
 
@@ -45,20 +49,16 @@ def test_forces_do_the_work_of_the_wrench(name):
 
 
 def test_indices_of_the_velocity_ellipsoid():
-    robot = ROBOTS["SSM"]
-    T = poses_near_home(robot, 4)
+    T = poses_near_home(GOOD, 4)
     for length in (0.3, 1.0):
-        J = np.linalg.inv(pr.inverse_jacobian(robot, T)) * np.repeat([1, length], 3)[:, None]
+        J = np.linalg.inv(pr.inverse_jacobian(GOOD, T)) * np.repeat([1, length], 3)[:, None]
         s = np.linalg.svd(J, compute_uv=False)
-        np.testing.assert_allclose(pr.condition(robot, T, length), s[:, 0] / s[:, -1], rtol=1e-9)
-        volume = pr.maneuverability(robot, T, length=length)
-        np.testing.assert_allclose(volume, s.prod(axis=1), rtol=1e-9)
-    turned = robot.pose([0, 0, 1, 0, 0, np.pi / 2])
-    assert pr.condition(robot, turned) > 1e14
-    assert pr.leg_forces(robot, turned, np.ones(6)).status == pr.ForceStatus.UNBOUNDED
-    assert np.isfinite(pr.dkm(robot, turned, np.ones(6))).all()
-    delta = ROBOTS["delta"]
-    assert pr.condition(delta, delta.home, 0.1) == pr.condition(delta, delta.home, 9.0)
+        np.testing.assert_allclose(pr.condition(GOOD, T, length), s[:, 0] / s[:, -1], rtol=1e-9)
+        np.testing.assert_allclose(pr.maneuverability(GOOD, T, length=length), s.prod(axis=1))
+    turned = GOOD.pose([0, 0, 1, 0, 0, np.pi / 2])
+    assert pr.condition(GOOD, turned) > 1e14
+    assert pr.leg_forces(GOOD, turned, np.ones(6)).status == pr.ForceStatus.UNBOUNDED
+    assert np.isfinite(pr.dkm(GOOD, turned, np.ones(6))).all()
 
 
 # --- singular positions --------------------------------------------------------------------------
@@ -152,7 +152,9 @@ def test_singular_positions_of_robots_with_cranks():
     five = pr.five_bar([[0, 0], [1.0, 0]], 0.3, 0.5)
     T = five.pose([0.5, 0.3])  # rods on one line
     assert pr.classify_singularity(five, five.pose([0.5, 0.6])).kind == Kind.REGULAR
-    stretched = pr.classify_singularity(five, T, mode=int(elbows_up(five, T)))
+    legs = pr.igm(five, T)
+    up = int(legs.mode[np.sin(legs.q).sum(axis=1).argmax()])
+    stretched = pr.classify_singularity(five, T, mode=up)
     assert (stretched.kind, stretched.variety) == (Kind.PARALLEL, "1")
     # knees of a Delta above the anchors: rods are parallel
     delta = pr.delta(0.1 * RING, 0.4 * RING, TURN, 0.3, 0.8)
@@ -167,15 +169,6 @@ def test_singular_positions_of_robots_with_cranks():
         pr.classify_singularity(five, five.pose([5.0, 0]))
     with pytest.raises(ShapeError, match="loop over poses"):
         pr.classify_singularity(five, five.home[None])
-
-
-def elbows_up(robot, T):
-    legs = pr.igm(robot, T)
-    return legs.mode[np.sin(legs.q).sum(axis=1).argmax()]
-
-
-TURN = np.deg2rad([-90.0, 30.0, 150.0])
-RING = np.c_[np.cos(TURN), np.sin(TURN), 0.0 * TURN]
 
 
 # --- workspaces ----------------------------------------------------------------------------------
@@ -227,27 +220,14 @@ def test_shells_about_one_centre_have_a_known_volume():
     rng = np.random.default_rng(3)
     points = rng.normal(size=(6, 3))
     robot = pr.gough(points, points, lower=0.3, upper=1.0, home=moved(np.eye(4), np.ones(6)))
-    found = pr.workspace(robot, orientation=np.eye(3), resolution=60)
-    assert found.volume == pytest.approx(4 / 3 * np.pi * (1 - 0.027), rel=3e-3)
+    for resolution in (60, 61):
+        found = pr.workspace(robot, orientation=np.eye(3), resolution=resolution)
+        assert found.volume == pytest.approx(4 / 3 * np.pi * (1 - 0.027), rel=3e-3)
     robot = pr.gough_symmetric(1.0, lower=0.5, upper=1.2)
     section = pr.workspace(robot, height=float(robot.home[2, 3]), resolution=80)
     assert np.allclose(section.poses[:, 2, 3], robot.home[2, 3])
     inside = pr.igm(robot, section.poses).within_limits[:, 0]
     np.testing.assert_array_equal(inside, section.count == 1)
-
-
-@pytest.mark.parametrize("resolution", [40, 41])
-def test_measures_are_those_of_a_linear_function_in_each_cell(resolution):
-    """Of planes, exactly, and of a ball."""
-    x = (np.arange(resolution) + 0.5) * 2.0 / resolution - 1.0
-    size, (a, b, c) = np.full(3, x[1] - x[0]), np.meshgrid(x, x, x, indexing="ij")
-    assert measure(a + b - 0.3, size, 3) == pytest.approx(2 * 0.5 * 1.7**2, rel=1e-3)
-    assert measure((a + b - 0.3)[..., 0], size[:2], 2) == pytest.approx(0.5 * 1.7**2, rel=1e-3)
-    assert measure(a + 2 * b - 3 * c, size, 3) == pytest.approx(4.0, rel=1e-9)
-    assert measure(2 * c[0] - 0.5, size[:2], 2) == pytest.approx(1.5, rel=1e-9)
-    ball = measure(0.7 - np.sqrt(a * a + b * b + c * c), size, 3)
-    assert ball == pytest.approx(4 / 3 * np.pi * 0.343, rel=3e-3)
-    assert np.isnan(measure(a, size, 2))
 
 
 def test_cones_and_legs_that_touch_cut_the_workspace():
@@ -265,11 +245,6 @@ def test_cones_and_legs_that_touch_cut_the_workspace():
     turned = pr.workspace(robot, orientation=np.deg2rad(170), leg_radius=0.05, **options)
     assert turned.area == 0.0  # the legs cross
     assert turned.status == performance.WorkspaceStatus.EMPTY
-
-
-def leg_directions(robot, T):
-    d = robot.platform @ np.swapaxes(T[:, :3, :3], 1, 2) + T[:, None, :3, 3] - robot.base
-    return d / np.linalg.norm(d, axis=-1, keepdims=True)
 
 
 def test_robots_with_cranks_count_working_modes():
@@ -373,28 +348,18 @@ def test_simulation_ends_at_singular_positions():
     assert "singular" in motion.reason()
     five = with_masses(ROBOTS["five-bar"])
     assert pr.simulate(five, five.home, t=2.0).status == pr.MotionStatus.SINGULAR
-
-
-def nan_from(start, t, T, V):
-    return np.full(6, np.nan if t >= start else 8.0)
-
-
-def test_mistakes_in_dynamics():
-    robot = ROBOTS["SSM"]
-    with pytest.raises(InvalidValueError, match="with_masses"):
-        pr.idm(robot, robot.home, np.zeros(6), np.zeros(6))
-    with pytest.raises(InvalidValueError, match="symmetric"):
-        robot.with_masses((1.0, np.zeros(3), np.diag([1, 1, -1])))
-    heavy = with_masses(robot)
-    with pytest.raises(InvalidValueError, match="singular"):
-        pr.idm(heavy, robot.pose([0, 0, 1, 0, 0, np.pi / 2]), np.zeros(6), np.zeros(6))
-    with pytest.raises(InvalidValueError, match="singular"):
-        pr.simulate(heavy, robot.pose([0, 0, 1, 0, 0, np.pi / 2]))
-    with pytest.raises(ShapeError, match="control"):
-        pr.simulate(heavy, robot.home, control=lambda t, T, V: [1.0], t=0.1)
-    for start in (0.0, 0.05):  # once without an end
-        with pytest.raises(InvalidValueError, match=r"control.*finite"):
-            pr.simulate(heavy, robot.home, None, partial(nan_from, start), 0.1)
+    right = robot.pose([0, 0, 1, 0, 0, np.pi / 2])
+    nothing, rest = (lambda t, T, V: np.full(6, np.nan if t >= 0.05 else 8.0)), np.zeros(6)
+    for call, words in (
+        (lambda: pr.idm(GOOD, GOOD.home, rest, rest), "with_masses"),
+        (lambda: GOOD.with_masses((1.0, np.zeros(3), np.diag([1, 1, -1]))), "symmetric"),
+        (lambda: pr.idm(robot, right, rest, rest), "singular"),
+        (lambda: pr.simulate(robot, right), "singular"),
+        (lambda: pr.simulate(robot, robot.home, control=lambda t, T, V: [1.0], t=0.1), "control"),
+        (lambda: pr.simulate(robot, robot.home, None, nothing, 0.1), r"control.*finite"),
+    ):
+        with pytest.raises((InvalidValueError, ShapeError), match=words):
+            call()
 
 
 # --- kinematic loops -----------------------------------------------------------------------------
@@ -428,24 +393,14 @@ def test_a_five_bar_as_loops_is_the_five_bar():
     np.testing.assert_allclose(np.sort(modes.T[:, 1, 3]), np.sort(both.T[:, 1, 3]), atol=1e-8)
     assert pr.classify_singularity(looped, T).kind == Kind.REGULAR
     np.testing.assert_allclose(looped.coordinates(T), place[:2], atol=1e-12)
-    for call in (
-        lambda: pr.inverse_jacobian(looped, T, mode=3),
-        lambda: pr.idm(looped, T, V, V, mode=1),
-    ):
-        with pytest.raises(InvalidValueError, match="mode"):
-            call()
+    with pytest.raises(InvalidValueError, match="mode"):
+        pr.inverse_jacobian(looped, T, mode=3)
     lifted = np.array([T, T])
     lifted[1, 2, 3] = 0.1  # the position is that of the plane, the height is not
     assert pr.igm(looped, lifted).status.tolist() == [0, pr.LegStatus.OUT_OF_REACH]
-    with pytest.raises(InvalidValueError, match="does not reach"):
-        pr.inverse_jacobian(looped, lifted)
     assert pr.dgm(looped, q, T).iterations == 1
-    with pytest.raises(InvalidValueError, match="loops"):
-        pr.determinant(looped, T)
     far = pr.igm(looped, five.pose([3.0, 0.0]))
     assert (far.count, far.status) == (0, pr.LegStatus.OUT_OF_REACH)
-    with pytest.raises(InvalidValueError, match="LoopedRobot"):
-        pr.from_loops(five, 1)
 
 
 def gough_as_loops(robot):
@@ -498,20 +453,14 @@ def test_a_gough_platform_as_loops_is_the_gough_platform():
 
 
 def test_pictures_show_the_legs_where_they_are():
-    robot = pr.gough_symmetric(1.0, lower=0.8, upper=1.5)
-    T = robot.pose([0.1, 0.0, 1.0, 0.1, 0.2, 0.3])
-    scene = viz.show_parallel(robot, T)
-    anchor = T[:3, :3] @ robot.platform[2] + T[:3, 3]
+    T = GOOD.pose([0.1, 0.0, 1.0, 0.1, 0.2, 0.3])
+    scene = viz.show_parallel(GOOD, T)
+    anchor = T[:3, :3] @ GOOD.platform[2] + T[:3, 3]
     np.testing.assert_allclose(scene.pose("piston_2")[:3, 3], anchor, atol=1e-12)
     np.testing.assert_allclose(scene.pose("platform"), T, atol=1e-12)
-    moving = viz.show_parallel(robot, robot.pose([[0, 0, 1, 0, 0, 0], [0.1, 0, 1.1, 0, 0.1, 0]]))
-    assert moving.motion.samples == 2
-    assert len(viz.jog_parallel(robot, T).sliders.data()["struts"]) == 6
+    assert viz.show_parallel(GOOD, np.stack((GOOD.home, T))).motion.samples == 2
+    assert len(viz.jog_parallel(GOOD, T).sliders.data()["struts"]) == 6
     planar = viz.jog_parallel(ROBOTS["3-RPR"]).sliders.data()["joints"]
     assert [s["name"] for s in planar if s["leads"]] == ["x", "y", "yaw"]
-    with pytest.raises(InvalidValueError, match="variable length"):
-        viz.jog_parallel(ROBOTS["delta"])
-    with pytest.raises(InvalidValueError, match="plane"):
-        viz.plot_platform_workspace(pr.workspace(robot, resolution=5))
     modes = pr.assembly_modes(ROBOTS["delta"], [0.1, 0.2, 0.3])
     assert len(viz.plot_assembly_modes(ROBOTS["delta"], modes).axes) == 2

@@ -1,11 +1,12 @@
 """Feasible paths, polytopes, dexterity, their figures and commands."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.optimize import linprog
-from test_performance import LIMITED, POSITION, TWO, WENGER, planar
+from test_performance import LIMITED, PLANE, POSITION, TWO, WENGER, planar
 
 import robotmodels as rm
 from robotmodels import performance as pf
@@ -67,6 +68,12 @@ def test_a_reached_line_that_no_posture_follows():
     assert found.status is pf.PathStatus.BROKEN
     assert str(found.breaks.max()) in found.reason()
     assert np.isnan(found.q[found.breaks.max() :]).all()
+    iiwa = rm.load("iiwa14")
+    found = pf.feasible_path(iiwa, rm.dgm(iiwa, np.zeros((3, 7))))
+    assert found.status is pf.PathStatus.NOT_DEFINED
+    nowhere = pf.feasible_path(TWO, np.array([translation(9, 0, 0)] * 3))
+    assert (nowhere.status, len(nowhere.reached)) == (pf.PathStatus.BROKEN, 0)
+    assert pf.feasible_path(TWO, np.zeros((0, 4, 4))).q.shape == (0, 2)
 
 
 def test_limits_and_whole_turns():
@@ -79,10 +86,7 @@ def test_limits_and_whole_turns():
     far = pf.feasible_path(arm, rm.dgm(arm, q + np.array([1.0, 0.0])))
     assert far.status is pf.PathStatus.BROKEN
     assert far.breaks.max() == np.argmax(q[:, 0] + 1 > 9)
-
-
-def test_a_start_beyond_half_a_turn():
-    arm = planar(1.0, 0.6, lower=[2, 0.1], upper=[9, 2])
+    arm = planar(1.0, 0.6, lower=[2, 0.1], upper=[9, 2])  # a start beyond half a turn
     q = np.column_stack((np.linspace(3.5, 8.0, 100), np.full(100, 1.0)))
     np.testing.assert_allclose(pf.feasible_path(arm, rm.dgm(arm, q)).q, q, atol=1e-6)
 
@@ -115,28 +119,22 @@ def test_the_best_motion_has_the_least_cost():
     assert other.status is pf.PathStatus.FOLLOWED
 
 
-def test_paths_without_postures_and_with_too_many():
-    iiwa = rm.load("iiwa14")
-    found = pf.feasible_path(iiwa, rm.dgm(iiwa, np.zeros((3, 7))))
-    assert found.status is pf.PathStatus.NOT_DEFINED
-    nowhere = pf.feasible_path(TWO, np.array([translation(9, 0, 0)] * 3))
-    assert nowhere.status is pf.PathStatus.BROKEN
-    assert len(nowhere.reached) == 0
-    assert "first pose" in nowhere.reason()
-    assert pf.feasible_path(TWO, np.zeros((0, 4, 4))).q.shape == (0, 2)
-
-
 # --- polytopes -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("mask", ["position", "orientation", [1, 1, 0, 0, 0, 0], [0, 0, 1, 0, 0, 0],
-                                  None])  # fmt: skip
+MASKS = [[1, 1, 1, 0, 0, 0], [0, 0, 0, 1, 1, 1], PLANE, [0, 0, 1, 0, 0, 0], [1] * 6]
+
+
+def limited(arm):
+    """The arm with limits of velocities and efforts."""
+    limits = {"velocity": np.linspace(1, 2, arm.n), "effort": np.linspace(9, 5, arm.n)}
+    return arm.with_table(replace(arm.table, **limits))
+
+
+@pytest.mark.parametrize("mask", MASKS)
 @pytest.mark.parametrize("name", ["ur5e", "panda", "cobra_s600", "planar_2r"])
 def test_velocity_polytope_has_the_extremes_of_the_box(name, mask):
-    arm = rm.load(name)
-    arm = arm.with_table(_limited(arm))
-    rows = np.repeat((True, False), 3) if mask == "position" else np.repeat((False, True), 3)
-    rows = rows if isinstance(mask, str) else np.array([1] * 6 if mask is None else mask, bool)
+    arm, rows = limited(rm.load(name)), np.array(mask, bool)
     for q in (RNG.uniform(-2, 2, arm.n), np.zeros(arm.n)):
         found = pf.polytope(arm, q, "velocity", mask)
         G = rm.jacobian(arm, q)[rows] * arm.table.velocity
@@ -148,40 +146,19 @@ def test_velocity_polytope_has_the_extremes_of_the_box(name, mask):
         if full:
             support = np.abs(d @ G).sum(axis=1) / np.linalg.norm(d, axis=1)
             assert found.radius <= support.min() + 1e-9
-            unit = np.linalg.norm(found.vertices, axis=1)
-            assert found.radius <= unit.min() + 1e-9
-        if len(G) == 3 and full:
-            _check_faces(found)
+            if len(G) == 3:  # the origin is on one side of each face, a triangle
+                a, b, c = np.moveaxis(found.vertices[found.faces], 1, 0)
+                n = np.cross(b - a, c - a)
+                heights = np.abs((n * a).sum(1)) / (size := np.linalg.norm(n, axis=1))
+                assert found.radius == pytest.approx(heights.min(), rel=1e-9)
+                away = np.abs(found.vertices @ (n / size[:, None]).T)
+                assert (away <= heights + 1e-8).all()
 
 
-def _limited(arm):
-    from dataclasses import replace
-
-    return replace(arm.table, velocity=np.linspace(1, 2, arm.n), effort=np.linspace(9, 5, arm.n))
-
-
-def _check_faces(found):
-    """Euler's formula, flat triangles with the origin on one side, and the radius from them."""
-    assert found.faces.shape[1] == 3
-    edges = {frozenset((f[i], f[i - 1])) for f in found.faces for i in range(len(f))}
-    assert len(found.vertices) - len(edges) + len(found.faces) == 2
-    heights = []
-    for face in found.faces:
-        a, b, c = found.vertices[face[:3]]
-        n = np.cross(b - a, c - a)
-        n /= np.linalg.norm(n)
-        assert np.ptp(found.vertices[face] @ n) < 1e-8
-        heights.append(abs(n @ a))
-        assert np.abs(found.vertices @ n).max() <= heights[-1] + 1e-8
-    assert found.radius == pytest.approx(min(heights), rel=1e-9)
-
-
-@pytest.mark.parametrize("mask", ["position", [1, 1, 0, 0, 0, 0], None])
+@pytest.mark.parametrize("k", [3, 2, 6])
 @pytest.mark.parametrize("name", ["ur5e", "panda"])
-def test_force_polytope_is_what_torques_balance(name, mask):
-    arm = rm.load(name)
-    arm = arm.with_table(_limited(arm))
-    k = {"position": 3}.get(mask if isinstance(mask, str) else "", 2 if mask else 6)
+def test_force_polytope_is_what_torques_balance(name, k):
+    arm, mask = limited(rm.load(name)), [1] * k + [0] * (6 - k)
     q = RNG.uniform(-2, 2, arm.n)
     J, tau = rm.jacobian(arm, q)[:k], arm.table.effort
     found = pf.polytope(arm, q, "force", mask)
@@ -189,14 +166,10 @@ def test_force_polytope_is_what_torques_balance(name, mask):
     for d in RNG.normal(size=(8, k)):
         best = linprog(-d, np.vstack((J.T, -J.T)), np.tile(tau, 2), bounds=[(None, None)] * k)
         assert (found.vertices @ d).max() == pytest.approx(-best.fun, rel=1e-7)
-    if k == 3:
-        _check_faces(found)
 
 
 def test_acceleration_polytope():
-    arm = rm.load("ur5e")
-    arm = arm.with_table(_limited(arm))
-    q = RNG.uniform(-2, 2, 6)
+    arm, q = limited(rm.load("ur5e")), RNG.uniform(-2, 2, 6)
     found = pf.polytope(arm, q, "acceleration", "position")
     tau = RNG.choice([-1.0, 1.0], (400, 6)) * arm.table.effort
     v = np.zeros(6)
@@ -207,20 +180,19 @@ def test_acceleration_polytope():
 
 
 def test_polytopes_without_inside_or_bound():
-    two = planar(1.0, 0.6).with_table(_limited(TWO))
-    stretched = pf.polytope(two, [0.3, 0.0], "velocity", [1, 1, 0, 0, 0, 0])
+    two = limited(TWO)
+    stretched = pf.polytope(two, [0.3, 0.0], "velocity", PLANE)
     assert stretched.status is pf.PolytopeStatus.FLAT
     assert stretched.radius == 0.0
-    forces = pf.polytope(two, [0.3, 0.0], "force", [1, 1, 0, 0, 0, 0])
+    forces = pf.polytope(two, [0.3, 0.0], "force", PLANE)
     assert forces.status is pf.PolytopeStatus.UNBOUNDED
-    with pytest.raises(InvalidValueError, match="velocity limits"):
-        pf.polytope(rm.load("rx90"), np.zeros(6))
-    with pytest.raises(InvalidValueError, match="kind"):
-        pf.polytope(two, [0, 1], "speed")
-    with pytest.raises(ShapeError, match="one configuration"):
-        pf.polytope(two, [[0, 1]])
-    with pytest.raises(InvalidValueError, match="masses"):
-        pf.polytope(two, [0, 1], "acceleration", [1, 1, 0, 0, 0, 0])
+    for call, words in (
+        ((rm.load("rx90"), np.zeros(6)), "velocity limits"),
+        ((two, [[0, 1]]), "one configuration"),
+        ((two, [0, 1], "acceleration", PLANE), "masses"),
+    ):
+        with pytest.raises((InvalidValueError, ShapeError), match=words):
+            pf.polytope(*call)
 
 
 # --- dexterity -----------------------------------------------------------------------------------
@@ -277,9 +249,8 @@ def test_means_over_joints_and_workspace():
 # --- figures and commands ------------------------------------------------------------------------
 
 
-def test_figures():
-    w = pf.workspace(LIMITED, resolution=30)
-    figure = rm.viz.plot_workspace(w)
+def test_figures_of_workspaces_aspects_and_paths():
+    figure = rm.viz.plot_workspace(pf.workspace(LIMITED, resolution=30))
     assert {"boundary", "limit"} <= {x.get_label() for x in figure.axes[0].get_lines()}
     space = pf.workspace(WENGER, section="space", resolution=8)
     assert len(rm.viz.plot_workspace(space).axes) == 4
@@ -287,21 +258,15 @@ def test_figures():
     line = straight(TWO, [0.1, 1.0], [1.0, 0.0, 0.0], 30)
     labels = rm.viz.plot_feasible_path(pf.feasible_path(TWO, line)).axes[0]
     assert "ends here" in labels.get_legend_handles_labels()[1]
-    paths = rm.viz.show_workspace(space).paths
-    assert {"workspace/2", "workspace/4"} <= set(paths)
-    with pytest.raises(InvalidValueError, match="no cells"):
-        rm.viz.plot_workspace(pf.workspace(planar(1.0)))
+    assert {"workspace/2", "workspace/4"} <= set(rm.viz.show_workspace(space).paths)
 
 
 def test_command_workspace(capsys, tmp_path):
-    picture = tmp_path / "section.png"
-    assert main(["workspace", "planar_2r", "--no-limits", "--picture", str(picture)]) == 0
-    out = capsys.readouterr().out
-    assert "12.5664 m^2" in out
-    assert picture.stat().st_size > 1000
+    words = ["workspace", "planar_2r", "--no-limits", "--picture", str(tmp_path / "section.png")]
+    assert main(words) == 0
+    assert "12.5664 m^2" in capsys.readouterr().out
     assert main(["workspace", "planar_2r", "--resolution", "10", "--json"]) == 0
-    data = json.loads(capsys.readouterr().out)
-    assert data["by_postures"][0]["postures"] == 2
+    assert json.loads(capsys.readouterr().out)["by_postures"][0]["postures"] == 2
     assert main(["workspace", "planar_2r", "--resolution", "0"]) == 2
     assert "--resolution" in capsys.readouterr().err
 

@@ -37,21 +37,10 @@ def seen_after(T, twist):
     return expm(-hat(np.asarray(twist))) @ T
 
 
-def angles_of(feature):
-    """Period of each component."""
-    name = type(feature).__name__
-    period = {"Lines": [0, 2 * np.pi], "Cylinder": [0, 2 * np.pi], "Segments": [0, 0, 0, 2 * np.pi]}
-    if name == "Moments":
-        return np.array([np.pi if c == "alpha" else 0.0 for c in feature.components])
-    one = period.get(name, [0.0])
-    return np.tile(one, feature.size // len(one))
-
-
 def differences(feature, T, h=1e-5):
-    columns = []
+    period, columns = feature._periods(), []
     for direction in h * np.eye(6):
         ds = feature.measure(seen_after(T, direction)) - feature.measure(seen_after(T, -direction))
-        period = angles_of(feature)
         columns.append(ds - period * np.round(ds / np.where(period > 0.0, period, 1.0)))
     return np.array(columns).T / (2.0 * h)
 
@@ -91,22 +80,14 @@ def test_interaction_is_the_derivative_of_the_measurement(feature):
     assert L.shape == (24, feature.size, 6)
     for T, matrix in zip(poses, L, strict=True):
         assert abs(matrix - differences(feature, T)).max() < 1e-7 * max(1.0, abs(matrix).max())
-
-
-@every
-def test_features_are_values_and_take_batches(feature):
+    # features are values and take batches
     again = pickle.loads(pickle.dumps(feature))
-    assert again == feature
-    assert hash(again) == hash(feature)
+    assert (again, hash(again)) == (feature, hash(feature))
     assert len(repr(feature).splitlines()) <= 6
-    rng = np.random.default_rng(2)
-    T = np.array([pose(rng) for _ in range(6)]).reshape(2, 3, 4, 4)
-    k = feature.size
-    assert feature.measure(T).shape == (2, 3, k)
-    assert np.allclose(feature.measure(T)[1, 2], feature.measure(T[1, 2]), rtol=0, atol=1e-12)
-    assert np.allclose(feature.interaction(T.tolist())[0, 1], feature.interaction(T[0, 1]))
-    assert feature.measure(np.empty((0, 4, 4))).shape == (0, k)
-    assert feature.interaction(np.empty((0, 4, 4))).shape == (0, k, 6)
+    shaped = np.reshape(poses, (4, 6, 4, 4))
+    assert np.allclose(feature.interaction(shaped.tolist()), L.reshape(4, 6, -1, 6))
+    assert np.allclose(feature.measure(shaped)[1, 2], feature.measure(poses[8]), rtol=0, atol=1e-12)
+    assert feature.measure(shaped[:0]).shape == (0, 6, feature.size)
 
 
 def test_measurements_are_projections():
@@ -195,18 +176,6 @@ def test_moments_of_a_parallel_plane_have_the_published_rows():
     assert normed.measure(T)[2] == pytest.approx(Z)
 
 
-def test_skewness_turns_with_the_image_and_ignores_shift_and_scale():
-    asymmetric = vs.Moments(PLATE, components=("c_x", "c_y"))
-    c = asymmetric.measure(translation(0.0, 0.0, 1.0))
-    assert asymmetric.measure(translation(0.2, -0.1, 3.0)) == pytest.approx(c, abs=1e-9)
-    turned = asymmetric.measure(translation(0.0, 0.0, 1.0) @ rotation("z", 0.7))
-    assert turned == pytest.approx(rotation("z", 0.7)[:2, :2] @ c, abs=1e-9)
-    assert np.linalg.norm(c) > 0.01
-    assert vs.Moments(SQUARE, components=("c_x", "c_y")).measure(
-        translation(0, 0, 1)
-    ) == pytest.approx([0, 0], abs=1e-9)
-
-
 def test_a_sphere_of_known_depth_has_its_exact_matrix():
     sphere = vs.Sphere([0.1, 0.1, 0.0], 0.2)
     for T in (pose(np.random.default_rng(k)) for k in range(5)):
@@ -218,10 +187,6 @@ def test_a_sphere_of_known_depth_has_its_exact_matrix():
 
 def test_bare_matrices_are_those_of_the_features():
     T = pose(np.random.default_rng(6))
-    X = np.array([0.1, 0.2, 0.3]) @ T[:3, :3].T + T[:3, 3]
-    x, y = X[:2] / X[2]
-    point = vs.Points([0.1, 0.2, 0.3])
-    assert np.allclose(vs.interaction_point(x, y, X[2]), point.interaction(T))
     assert vs.interaction_point([0.1, 0.2], 0.0, 1.0).shape == (2, 2, 6)
     # any plane through a line gives the same matrix
     ends = np.array([[0.1, 0.2, 0.0], [0.3, -0.1, 0.2]])
@@ -231,13 +196,6 @@ def test_bare_matrices_are_those_of_the_features():
         n = np.cross(Q - P, direction)
         L = vs.interaction_line(*line.measure(T), [*n, -n @ P])
         assert np.allclose(L, line.interaction(T))
-    n = T[:3, :3] @ [0.0, 0.0, 1.0]
-    circle = vs.Circle([0, 0, 0], [0, 0, 1], 0.2)
-    L = vs.interaction_ellipse(*circle.measure(T), [*n, -n @ T[:3, 3]])
-    assert np.allclose(L, circle.interaction(T))
-    segment = vs.Segments([ends])
-    L = vs.interaction_segment(*segment.measure(T), [P[2], Q[2]])
-    assert np.allclose(L, segment.interaction(T))
     m = np.zeros((3, 3))
     m[0, 0], m[1, 0], m[0, 1] = 0.5, 0.1, 0.2
     row = vs.interaction_moment(m, 0, 0, [0, 0, 1, -2.0])
@@ -311,12 +269,7 @@ def test_virtual_links(feature, link_class, name):
     for size, twist in zip(sizes[: link.rank], Vt, strict=False):
         moved = np.linalg.norm(feature.measure(seen_after(T, 1e-6 * twist)) - s)
         assert moved == pytest.approx(1e-6 * size, rel=0.01)
-
-
-def test_virtual_links_of_many_poses():
-    circle = vs.Circle([0, 0, 0], [0, 0, 1], 0.2)
-    T = np.array([translation(0, 0, 1), pose(np.random.default_rng(3))])
-    links = vs.virtual_link(circle, T)
+    links = vs.virtual_link(vs.Circle([0, 0, 0], [0, 0, 1], 0.2), [translation(0, 0, 1), T])
     assert links.rank.tolist() == [3, 5]  # seen centred it has a larger class
     assert links.kernel_twists.shape == (2, 3, 6)
     assert np.isnan(links.kernel_twists[1, 1:]).all()
@@ -329,42 +282,29 @@ TASK = vs.Task(vs.Points(SQUARE), GOAL)
 
 
 @pytest.mark.parametrize(
-    ("call", "kind", "words"),
+    ("call", "words"),
     [
-        (lambda: vs.Circle([0, 0, 0], [1, 0, 0], 0.1).measure(GOAL), InvalidValueError, "edge-on"),
-        (lambda: vs.Cylinder([0, 0, 0], [1, 0, 0], 1).measure(GOAL), InvalidValueError, "inside"),
-        (lambda: vs.Lines([[[0, 0, 0], [0, 0, 1]]]).measure(GOAL), InvalidValueError, "edge-on"),
-        (lambda: vs.Moments(SQUARE[:2]), ShapeError, "k from 3"),
-        (lambda: vs.Moments([[0, 0, 0], [1, 0, 0], [2, 0, 0]]), InvalidValueError, "area"),
-        (lambda: vs.Moments(SQUARE[[0, 2, 1, 3]]), InvalidValueError, "cross|area"),
-        (lambda: vs.Moments([*SQUARE[:3], [0, 0, 1]]), InvalidValueError, "one plane"),
-        (lambda: vs.Moments(SQUARE, components=("area", "m17")), InvalidValueError, "m17"),
-        (lambda: vs.Moments(SQUARE).measure(GOAL), InvalidValueError, "alpha"),
-        (lambda: vs.Camera(focal=0), InvalidValueError, "focal"),
-        (lambda: vs.interaction_point(0, 0, 0), InvalidValueError, "Z"),
-        (lambda: vs.interaction_line(0, 0, [0, 0, 1, 0]), InvalidValueError, "plane"),
-        (lambda: vs.estimate_interaction([[1]], np.ones((2, 6))), ShapeError, "dS"),
-        (lambda: vs.Task(vs.Points(SQUARE), vs.Sphere([0, 0, 0], 1)), InvalidValueError, "Sphere"),
-        (lambda: vs.Task(vs.Points(SQUARE), GOAL, interaction="best"), InvalidValueError, "mean"),
-        (lambda: vs.Task(vs.Points(SQUARE), np.ones(8), interaction="mean"), InvalidValueError,
+        (lambda: vs.Camera(focal=0), "focal"),
+        (lambda: vs.interaction_point(0, 0, 0), "Z"),
+        (lambda: vs.Circle([0, 0, 0], [1, 0, 0], 0.1).measure(GOAL), "edge-on"),
+        (lambda: vs.Cylinder([0, 0, 0], [1, 0, 0], 1).measure(GOAL), "inside"),
+        (lambda: vs.Moments([[0, 0, 0], [1, 0, 0], [2, 0, 0]]), "area"),
+        (lambda: vs.Moments(SQUARE[[0, 2, 1, 3]]), "cross|area"),
+        (lambda: vs.Task(vs.Points(SQUARE), vs.Sphere([0, 0, 0], 1)), "Sphere"),
+        (lambda: vs.Task(vs.Points(SQUARE), np.ones(8), interaction="mean"),
          "desired pose"),
-        (lambda: vs.camera_velocity(TASK, np.ones(8)), InvalidValueError, 'depth="true"'),
-        (lambda: vs.servo(TASK, GOAL, step=0), InvalidValueError, "step"),
-        (lambda: vs.p3p([[0, 0, 0], [1, 0, 0], [2, 0, 0]], np.eye(3)[:, :2]), InvalidValueError,
+        (lambda: vs.camera_velocity(TASK, np.ones(8)), 'depth="true"'),
+        (lambda: vs.p3p([[0, 0, 0], [1, 0, 0], [2, 0, 0]], np.eye(3)[:, :2]),
          "on a line"),
-        (lambda: vs.pnp(SQUARE, 300 + 900 * SQUARE[:, :2]), InvalidValueError, "normalise"),
-        (lambda: vs.p3p(SQUARE[:3], 300 + 900 * SQUARE[:3, :2]), InvalidValueError, "normalise"),
-        (lambda: vs.refine_pose(SQUARE, SQUARE[:, :2], inverse(GOAL)), InvalidValueError, "front"),
-        (lambda: vs.homography(np.ones((5, 2)), np.ones((5, 2))), InvalidValueError, "determine"),
-        (lambda: vs.decompose_homography(np.ones((3, 3))), InvalidValueError, "regular"),
+        (lambda: vs.pnp(SQUARE, 300 + 900 * SQUARE[:, :2]), "normalise"),
+        (lambda: vs.refine_pose(SQUARE, SQUARE[:, :2], inverse(GOAL)), "front"),
+        (lambda: vs.homography(np.ones((5, 2)), np.ones((5, 2))), "determine"),
         (lambda: vs.Task(vs.Sphere([0, 0, 0], 1.0), GOAL @ translation(0, 0, 1), depth=0.5),
-         InvalidValueError, "depth"),
-        (lambda: vs.interaction_theta_u([0, 0, 2 * np.pi]), InvalidValueError, "turn"),
-        (lambda: vs.pnp(SQUARE, np.zeros((4, 2))), InvalidValueError, "coincide"),
+         "depth"),
         (lambda: vs.camera_velocity(vs.Hybrid(vs.Task(vs.Points(SQUARE), GOAL, depth=0.5), vs.Task(
-            vs.Points(SQUARE[::-1]), GOAL, depth=0.5)), np.ones(8)), InvalidValueError, "second"),
+            vs.Points(SQUARE[::-1]), GOAL, depth=0.5)), np.ones(8)), "second"),
     ],
 )  # fmt: skip
-def test_refused(call, kind, words):
-    with pytest.raises(kind, match=words):
+def test_refused(call, words):
+    with pytest.raises((InvalidValueError, ShapeError), match=words):
         call()

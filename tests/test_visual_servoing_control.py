@@ -39,6 +39,12 @@ def test_four_points_converge(interaction):
     run = vs.servo(vs.Task(POINTS, GOAL, 1.0, interaction), START, duration=16.0, step=0.05)
     assert run.status is S.CONVERGES
     assert abs(run.T[-1] - GOAL).max() < 1e-6
+    task = run.task
+    run, again = (vs.servo(task, START, duration=0.5, noise=1e-3, rng=1) for _ in range(2))
+    assert (run.s == again.s).all()
+    for value in (run, task, vs.camera_velocity(task, START), vs.Camera()):
+        assert pickle.loads(pickle.dumps(value)) == value
+        assert len(repr(value).splitlines()) <= 6
 
 
 def test_simulated_poses_are_poses_and_of_order_four():
@@ -92,7 +98,10 @@ def test_matrices_of_the_law():
 @pytest.mark.parametrize("depth", ["true", "desired", 0.6])
 def test_every_feature_is_regulated(feature, depth):
     if depth == 0.6 and isinstance(feature, vs.Circle | vs.Moments):
-        pytest.skip("the matrix of a parallel plane is singular where the image is centred")
+        # the matrix of a parallel plane is singular where the image is centred
+        centred = vs.Task(vs.Circle([0, 0, 0], [0, 0, 1], 0.1), np.zeros(5), depth=0.5)
+        assert vs.camera_velocity(centred, [0, 0, 0.01, 0.01, 0]).status is S.SINGULAR
+        return
     start = translation(0.05, -0.04, 0.7) @ rotation("x", 0.2) @ rotation("z", 0.4)
     goal = GOAL @ rotation("y", 0.15)
     run = vs.servo(vs.Task(feature, goal, 1.0, depth=depth), start, duration=12.0, step=0.1)
@@ -215,22 +224,8 @@ def test_statuses_out_of_sight_and_behind():
         assert vs.camera_velocity(law, GOAL, camera).status is S.CONVERGES
 
 
-def test_measurements_alone_are_not_called_singular():
-    plane, ball = vs.Plane3D([0, 0, 1], 0.1), vs.Sphere([0, 0, 0], 0.1)
-    law = vs.Task(plane, plane.measure(GOAL))
-    assert vs.camera_velocity(law, plane.measure(START)).status is S.CONVERGES
-    law = vs.Task(ball, ball.measure(GOAL), depth=0.6)
-    step = vs.camera_velocity(law, ball.measure(START))
-    assert (step.status, step.rank) == (S.CONVERGES, 3)
-    centred = vs.Task(vs.Circle([0, 0, 0], [0, 0, 1], 0.1), np.zeros(5), depth=0.5)
-    assert vs.camera_velocity(centred, [0, 0, 0.01, 0.01, 0]).status is S.SINGULAR
-
-
 def test_angles_of_errors_take_the_short_way():
     line = vs.Lines([[[0.1, -1, 0], [0.1, 1, 0]]])
-    near = [GOAL @ rotation("z", np.pi / 2 + a) for a in (-0.05, 0.05)]
-    thetas = [line.measure(T)[1] for T in near]
-    assert abs(np.diff(thetas)) < 0.2 or abs(abs(np.diff(thetas)) - 2 * np.pi) < 0.2
     for shift in (0.0, np.pi / 2, np.pi, -np.pi / 2):
         a, b = (GOAL @ rotation("z", shift + d) for d in (-0.05, 0.05))
         assert abs(vs.camera_velocity(vs.Task(line, a), b).error[1]) < 0.11
@@ -254,10 +249,6 @@ def test_hybrid_task_along_a_line():
         alone = vs.camera_velocity(line, START).v
         assert abs(v - alone).max() > 1e-3
         assert line.feature.interaction(START) @ (v - alone) == pytest.approx(np.zeros(2), abs=1e-9)
-    with pytest.raises(InvalidValueError, match="needs the pose"):
-        vs.camera_velocity(
-            vs.Hybrid(vs.Task(POINTS, GOAL, depth=0.5), lambda T: np.ones(6)), POINTS.measure(START)
-        )
 
 
 def test_moving_targets_are_tracked():
@@ -340,19 +331,6 @@ def test_limits_are_kept_and_named():
     assert abs(run.error[-1]).max() > 1e-3
     with pytest.raises(InvalidValueError, match="inside the limits"):
         vs.servo(vs.Task(POINTS, GOAL), START, robot=UR5, q0=np.full(6, 9.0))
-    with pytest.raises(InvalidValueError, match="q0"):
-        vs.servo(vs.Task(POINTS, GOAL), START, robot=UR5)
-    with pytest.raises(InvalidValueError, match="mounting"):
-        vs.servo(vs.Task(POINTS, GOAL), START, robot=UR5, q0=POSTURE, mounting="hand")
-
-
-def test_runs_are_values():
-    task = vs.Task(POINTS, GOAL)
-    run, again = (vs.servo(task, START, duration=0.5, noise=1e-3, rng=1) for _ in range(2))
-    assert (run.s == again.s).all()
-    for value in (run, task, vs.camera_velocity(task, START), vs.Camera()):
-        assert pickle.loads(pickle.dumps(value)) == value
-        assert len(repr(value).splitlines()) <= 6
 
 
 # --- poses ---------------------------------------------------------------------------------------
@@ -413,9 +391,10 @@ def test_pose_of_many_points():
         assert abs(near.T[0] - found.T[0]).max() < 1e-8
         assert near.status == vs.PoseStatus.FOUND
     assert both >= 6
-    batch = vs.pnp(P, np.stack((image, noisy)))
-    assert batch.T.shape[0] == 2
+    assert vs.pnp(P, np.stack((image, noisy))).T.shape[0] == 2
     assert vs.pnp(P[:3], image[:3]).count >= 1
+    camera, X = vs.Camera(focal=(800, 600)), rng.uniform((-1, -1, 1), (1, 1, 3), (5, 4, 3))
+    assert camera.normalise(camera.project(X)) == pytest.approx(X[..., :2] / X[..., 2:])
 
 
 def test_a_square_far_away_has_two_minima():
@@ -426,13 +405,6 @@ def test_a_square_far_away_has_two_minima():
     normals = found.T[:, :3, 2]
     assert normals[0] @ normals[1] < np.cos(0.9)  # tilted the other way
     assert found.residual[1] > found.residual[0]
-    rng = np.random.default_rng(9)
-    counts = []
-    for _ in range(20):
-        plate = rng.uniform(-0.2, 0.2, (6, 3)) * (1, 1, 0)
-        far = translation(0.1, 0, 5.0) @ rotation("z", rng.uniform(-3, 3)) @ rotation("x", 0.5)
-        counts.append(vs.pnp(plate, vs.Points(plate).measure(far).reshape(6, 2)).count)
-    assert np.mean(np.array(counts) == 2) > 0.9
 
 
 def test_homographies():
@@ -469,9 +441,3 @@ def test_homographies():
     turn = vs.decompose_homography(rotation("x", 0.3)[:3, :3])
     assert turn.R.shape == (1, 3, 3)
     assert turn.t.tolist() == [[0.0, 0.0, 0.0]]
-
-
-def test_camera_pixels():
-    camera = vs.Camera(focal=(800, 600), centre=(320, 240), size=(640, 480))
-    X = np.random.default_rng(8).uniform((-1, -1, 1), (1, 1, 3), (5, 4, 3))
-    assert camera.normalise(camera.project(X)) == pytest.approx(X[..., :2] / X[..., 2:])

@@ -6,9 +6,9 @@ TESTS = "tests/test_export.py"
 MODELS = f"{TESTS} -k (tape_is_the_library or mimic)"
 POSTURES = f"{TESTS} -k (all_postures or singular_poses)"
 LANGUAGE = f"{TESTS} -k (languages or matlab)"
-COUNTS = f"{TESTS} -k (operations or exact or tape_shares)"
+COUNTS = f"{TESTS} -k (operations or tape_shares)"
 TYPES = f"{TESTS} -k types_of_equations"
-NAMES = f"{TESTS} -k (names or symbols or value or refused)"
+NAMES = f"{TESTS} -k (names or symbols or refused)"
 
 
 MOTIONS = "acceleration of the origin, Khalil's ``U``"

@@ -26,7 +26,7 @@ _FAULTS = [
      DERIVATIVE),
     ("log of the depth", "L[..., 2, 2], L[..., 2, 3]", "-w, -y, x", "-w, y, x", DERIVATIVE),
     ("weights of a triangle", "(-27.0, 25.0", "25.0, 25.0", "26.0, 25.0",
-     LOOK + "moments or skewness"),
+     LOOK + "moments"),
     ("semi-axes of an ellipse", "spread *= ", "0.25 *", "0.5 *", LOOK + "projections"),
     ("foreshortening of an ellipse", "flat -= z", "flat -= z", "flat += z", LOOK + "projections"),
     ("rows of a kernel", "free, motions = np.arange(6)", ">= rank", "< rank", LINKS),
