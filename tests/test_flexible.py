@@ -197,7 +197,7 @@ def test_inverse_and_direct_models_are_inverse(rng, joints):
     np.testing.assert_array_equal(np.hstack(one), np.hstack([tau[3], ea[3]]))
     pairs = q.reshape(2, 2, -1), e.reshape(2, 2, -1), v[0], ev[0]
     assert flexible.idm(arm, *pairs, a[0])[0].shape == (2, 2, arm.n)
-    assert flexible.ddm(arm, q[:0], e[:0], v[:0], None, None)[1].shape == (0, arm.m)
+    assert flexible.ddm(arm, q[:0], e[:0], v[:0], None, q[:0])[1].shape == (0, arm.m)
     values = arm, BEAM, BEAM.invariants, back, flexible.linearize(ONE, [0.0])
     for value in (*values, flexible.static_deflection(ONE, [0.0]), flexible.elastica(1, 1, 1.0)):
         assert len(str(value).splitlines()) <= 6
