@@ -16,7 +16,7 @@ MUTATIONS = [
     Mutation("parallel: legs", "moments of lines with the other sign", "def leg_states(",
         "np.cross(arm, direction)", "np.cross(direction, arm)", JACOBIANS),
     Mutation("parallel: legs", "a straight leg counts twice", "both solutions of a straight leg",
-        "(_bits(robot, modes) == 1)", "(_bits(robot, modes) == 2)", f"{MODELS} -k limits_and_reach"),
+        "(_bits(robot, modes) == 1)", "(_bits(robot, modes) == 2)", f"{MODELS} -k limits_and"),
     Mutation("parallel: velocities", "rate of a line without the turn of its moment",
         "def rates_of_rows(", "np.cross(spin, u) + np.cross(legs.arm, turn)",
         "np.cross(legs.arm, turn)", JACOBIANS),
