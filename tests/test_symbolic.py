@@ -2,7 +2,6 @@
 
 import math
 import re
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ import robotmodels as rm
 from robotmodels.errors import InvalidValueError
 from robotmodels.se3 import from_rpy
 from robotmodels.symbolic import explain_dgm, explain_jacobian
-from robotmodels.symbolic.angles import wrapped
 
 RIGHT = np.pi / 2
 CATALOGUE = [name for name in rm.robots() if not name.startswith("erd:")]
@@ -37,10 +35,6 @@ Pz = C23*RL4 + S2*D3"""
 
 def arm(*rows, **parts):
     return rm.RobotModel.from_table(rm.DHTable.from_rows(rows), **parts)
-
-
-def names(explanation):
-    return {s.name for s, _ in explanation.abbreviations}
 
 
 def check(model, explanation, rng, frame=None, tolerance=1e-12):
@@ -66,7 +60,7 @@ def test_rx90_is_example_1_2_letter_by_letter():
         expected = sympy.sympify(line.split(" = ")[1])
         assert sympy.expand(rx90.pose[k % 3, k // 3] - expected) == 0
     assert rx90.base is rx90.tool is None
-    C4, S4, RL4, D3, C23 = sympy.symbols("C4 S4 RL4 D3 C23")
+    RL4, D3, C23 = sympy.symbols("RL4 D3 C23")
     assert dict(rx90.constants) == {D3: 0.45, RL4: 0.45}
     theta2, theta3 = sympy.symbols("theta2 theta3")
     assert dict(rx90.abbreviations)[C23] == sympy.cos(theta2 + theta3)
@@ -74,44 +68,31 @@ def test_rx90_is_example_1_2_letter_by_letter():
     assert [t.name for t in rx90.products] == ["4T6", "3T6", "2T6", "1T6", "0T6"]
     assert rx90.products[1].motion == "3T4 4T6"
     assert rx90.factors[3].motion == "Rot(x, -π/2) Rot(z, θ4) Trans(z, RL4)"
-    T = sympy.Matrix([[C4, -S4, 0, 0], [0, 0, 1, RL4], [-S4, -C4, 0, 0], [0, 0, 0, 1]])
-    assert rx90.factors[3].matrix == T
     for part, of in ((rx90.s, 0), (rx90.n, 1), (rx90.a, 2), (rx90.P, 3)):
         assert part == rx90.pose[:3, of]
 
 
 def test_lab_rr_is_equation_4_5():
     new = {"RL1": "l1", "XE": "l2", "C1": "c1", "S1": "s1", "C2": "c2", "S2": "s2"}
-    c1, s1, c2, s2, l1, l2 = sympy.symbols("c1 s1 c2 s2 l1 l2")
-    expected = sympy.Matrix(
-        [
-            [c1 * c2, -s1, c1 * s2, c1 * c2 * l2],
-            [s1 * c2, c1, s1 * s2, s1 * c2 * l2],
-            [-s2, 0, c2, l1 - l2 * s2],
-            [0, 0, 0, 1],
-        ]
-    )
     rr = explain_dgm(rm.load("lab_rr"), symbols=new)
-    assert expected == rr.pose
+    expected = sympy.sympify(
+        "[[c1*c2, -s1, c1*s2, c1*c2*l2], [s1*c2, c1, s1*s2, s1*c2*l2],"
+        "[-s2, 0, c2, l1 - l2*s2], [0, 0, 0, 1]]"
+    )
+    assert rr.pose == sympy.Matrix(expected)
     assert "⎢   -s2    0     c2  l1 - s2*l2 ⎥" in rr.text
     assert r"l_{1} - s_{2} \, l_{2}" in rr.latex
-    assert dict(rr.constants) == {l1: 0.5, l2: 0.2}
+    assert {symbol.name: value for symbol, value in rr.constants} == {"l1": 0.5, "l2": 0.2}
 
 
 def test_rx90_has_the_third_matrix_of_the_book():
     J = explain_jacobian(rm.load("rx90"))
     assert (J.projection, J.intermediate) == ("R_3", "R_4")
-    C2, C3, S3, C4, S4, C5, S5, C23, S23, D3, RL4 = sympy.symbols(
-        "C2 C3 S3 C4 S4 C5 S5 C23 S23 D3 RL4"
+    expected = sympy.sympify(
+        "[[0, S3*D3 - RL4, -RL4, 0, 0, 0], [0, C3*D3, 0, 0, 0, 0],"
+        "[S23*RL4 - C2*D3, 0, 0, 0, 0, 0], [S23, 0, 0, 0, S4, -C4*S5],"
+        "[C23, 0, 0, 1, 0, C5], [0, 1, 1, 0, C4, S4*S5]]"
     )
-    expected = [
-        [0, S3 * D3 - RL4, -RL4, 0, 0, 0],
-        [0, C3 * D3, 0, 0, 0, 0],
-        [S23 * RL4 - C2 * D3, 0, 0, 0, 0, 0],
-        [S23, 0, 0, 0, S4, -C4 * S5],
-        [C23, 0, 0, 1, 0, C5],
-        [0, 1, 1, 0, C4, S4 * S5],
-    ]
     assert sympy.expand(J.reduced - sympy.Matrix(expected)) == sympy.zeros(6)
     assert J.lever == sympy.zeros(3, 1)
     assert J.second == sympy.eye(6)
@@ -235,13 +216,6 @@ def test_angles_are_exact_or_symbols(rng):
     check(model, explain_dgm(model), rng)
 
 
-@pytest.mark.parametrize(
-    ("turns", "expected"), [("3/2", "-1/2"), ("-3/2", "1/2"), ("-1", "1"), ("2", "0"), ("5", "1")]
-)
-def test_multiples_of_pi_are_wrapped(turns, expected):
-    assert wrapped(Fraction(turns)) == Fraction(expected)
-
-
 def test_long_results_are_cut_into_named_parts(rng):
     """An arm with every parameter oblique would otherwise print millions of terms."""
     keys = dict.fromkeys(("gamma", "beta", "alpha", "theta"), (0.1, 1.4))
@@ -249,7 +223,7 @@ def test_long_results_are_cut_into_named_parts(rng):
     rows = [{k: rng.uniform(*ends) for k, ends in keys.items()} for _ in range(6)]
     model = arm(*rows, base=random_pose(rng), tool=random_pose(rng))
     pose = explain_dgm(model)
-    assert "U1" in names(pose)
+    assert "U1 = " in pose.text
     assert len(pose.text) < 200_000
     check(model, pose, rng, tolerance=1e-13 * 50)
     rows = [{k: row[k] for k in ("alpha", "d", "theta", "r")} for row in (*rows, *rows[:2])]
@@ -264,18 +238,15 @@ def test_long_results_are_cut_into_named_parts(rng):
 # --- the result as a value, LaTeX and names ------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("symbols", "message"),
-    [
+def test_new_names_are_checked():
+    for symbols, message in (
         ({"D9": "x"}, "'D9' does not occur"),
         ({"RL2": "x"}, "Did you mean 'RL1'"),
         ({"RL1": "XE"}, "two things"),
-        ({"RL1": "2l"}, "identifier|letters"),
+        ({"RL1": "2l"}, "letters"),
         ({"RL1": 3}, "got 3"),
         ("RL1", "mapping"),
-    ],
-)
-def test_new_names_are_checked(symbols, message):
-    for explain in (explain_dgm, explain_jacobian, rm.explain_singularities):
-        with pytest.raises(InvalidValueError, match=message):
-            explain(rm.load("lab_rr"), symbols=symbols)
+    ):
+        for explain in (explain_dgm, explain_jacobian, rm.explain_singularities):
+            with pytest.raises(InvalidValueError, match=message):
+                explain(rm.load("lab_rr"), symbols=symbols)

@@ -272,3 +272,9 @@ def close(actual, expected, tolerance=1e-12):
     assert actual.shape == expected.shape
     scale = max(1.0, np.abs(expected).max(initial=0.0))
     np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance * scale)
+
+
+def within(actual, expected, tolerance=1e-12):
+    """Of one shape, and nowhere further apart than the tolerance."""
+    assert np.shape(actual) == np.shape(expected)
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance)
