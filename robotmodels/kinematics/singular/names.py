@@ -69,20 +69,17 @@ def singular_sets(
         return ()
     normals, codimension = normals_of(G)
     off = [np.abs(arm.residuals(event, x * task.joint_scale)).max(axis=1) for event in arm.events]
-    residual = np.stack(off, axis=1) if off else np.zeros((len(x), 0))
+    residual = np.reshape(off, (len(arm.events), len(x))).T
     # where the set is touched twice, its points are known to half of the digits
     flat = np.linalg.norm(G, axis=(1, 2)) < _FLAT
     holding = residual <= np.where(flat, _LOOSE, _TIGHT)[:, None]
     taking = (np.abs(normals) > _TAKES_PART).any(axis=1)
     signature = np.column_stack([codimension, holding, taking])
-    made: list[tuple[SingularSet, NDArray[np.bool_]]] = []
-    seen: set[bytes] = set()
-    for i in range(len(x)):
-        if (key := signature[i].tobytes()) in seen:
-            continue
-        seen.add(key)
-        cause = _cause(space, arm, x[i], normals[i, : codimension[i]], holding[i], G[i])
-        made.append((cause, residual[i] <= _LOOSE))
+    _, first = np.unique(signature, axis=0, return_index=True)
+    made = [
+        (_cause(space, arm, x[i], normals[i, : codimension[i]], holding[i], G[i]), residual[i])
+        for i in np.sort(first)
+    ]
     return _minimal(arm, made)
 
 
@@ -116,23 +113,22 @@ def _zero(tolerance: float) -> float:
     return max(10.0 * tolerance, 1e-7)
 
 
-def _minimal(
-    arm: ArmGeometry, made: list[tuple[SingularSet, NDArray[np.bool_]]]
-) -> tuple[SingularSet, ...]:
+def _minimal(arm: ArmGeometry, made: list[tuple[SingularSet, Array]]) -> tuple[SingularSet, ...]:
     """Those that are not where others meet, each once, the nearest first."""
-    sentences = [event.sentence for event in arm.events]
     found: dict[tuple[Name, ...], SingularSet] = {}
-    for cause, holding in sorted(made, key=lambda one: _specialty(one[0])):
-        here = {sentences[k] for k in np.flatnonzero(holding)}
+    for cause, residual in sorted(made, key=_specialty):
+        here = {arm.events[k].sentence for k in np.flatnonzero(residual <= _LOOSE)}
         if cause.events in found:
-            if cause.weak < found[cause.events].weak:
-                found[cause.events] = cause
-        elif not any({text for _, text in other.events} <= here for other in found.values()):
+            nearer = cause.weak < found[cause.events].weak
+        else:
+            nearer = not any({text for _, text in other} <= here for other in found)
+        if nearer:
             found[cause.events] = cause
     return tuple(sorted(found.values(), key=lambda cause: cause.weak))
 
 
-def _specialty(cause: SingularSet) -> tuple[int, bool, int, float]:
+def _specialty(made: tuple[SingularSet, Array]) -> tuple[int, bool, int, float]:
+    cause = made[0]
     return cause.codimension, not cause.known, -len(cause.events), cause.weak
 
 
