@@ -1,7 +1,6 @@
 """Motions in space, and the way from poses to joints."""
 
 import pickle
-import re
 import sys
 from functools import partial
 
@@ -27,7 +26,6 @@ from robotmodels.trajectories import (
     joint_path,
     straight_line,
 )
-from robotmodels.trajectories.follow import following
 from robotmodels.trajectories.pose_trajectory import axis_and_angle, rotation_about
 
 
@@ -64,31 +62,21 @@ def test_cartesian_trajectory_is_a_trapezoid_with_slerp(rng):
     T0, T1 = random_pose(rng), random_pose(rng)
     T = cartesian_trajectory(T0, T1, 50)
     x = np.arange(50) / 49.0
-    s = np.where(
-        x < 1 / 3, 2.25 * x**2, np.where(x < 2 / 3, 1.5 * x - 0.25, 1 - 2.25 * (1 - x) ** 2)
-    )
+    ramps = np.where(x < 2 / 3, 1.5 * x - 0.25, 1 - 2.25 * (1 - x) ** 2)
+    s = np.where(x < 1 / 3, 2.25 * x**2, ramps)
     turn = Slerp([0.0, 1.0], Rotation.from_matrix([T0[:3, :3], T1[:3, :3]]))(s).as_matrix()
     assert np.abs(T[:, :3, :3] - turn).max() < 1e-14
-    size = np.abs([T0[:3, 3], T1[:3, 3]]).max()
     missed = T[:, :3, 3] - T0[:3, 3] - s[:, None] * (T1 - T0)[:3, 3]
-    assert np.abs(missed).max() < 16.0 * np.finfo(float).eps * size
+    assert np.abs(missed).max() < 16.0 * np.finfo(float).eps * np.abs([T0, T1]).max()
     assert np.array_equal(T[[0, -1]], [T0, T1])
     assert (T[:, 3] == [0.0, 0.0, 0.0, 1.0]).all()
-    move = straight_line(T0, T1, duration=3.0)
-    assert np.abs(np.asarray(move.resample(50)) - T).max() < 1e-14
-    assert pickle.loads(pickle.dumps(move)) == move
-    many = cartesian_trajectory(np.stack([T0, T1, T0]), T1, 7)
-    assert np.array_equal(many[0], cartesian_trajectory(T0, T1, 7))
-    assert cartesian_trajectory(np.zeros((0, 4, 4)), T1, 7).shape == (0, 7, 4, 4)
     assert np.array_equal(cartesian_trajectory(T0, T1, 1), [T0])
     half = cartesian_trajectory(np.eye(4), se3.rotation("y", np.pi), 5)
     assert np.abs(half[2] - se3.rotation("y", np.pi / 2)).max() < 1e-15
-    for call, error, words in (
-        (lambda: cartesian_trajectory(2 * T0, T1, 5), NotARotationError, "T0"),
-        (lambda: cartesian_trajectory(T0, T1, 5, "jerk_limited"), InvalidValueError, "limits"),
-    ):
-        with pytest.raises(error, match=words):
-            call()
+    with pytest.raises(NotARotationError, match="T0"):
+        cartesian_trajectory(2 * T0, T1, 5)
+    with pytest.raises(InvalidValueError, match="limits"):
+        cartesian_trajectory(T0, T1, 5, "jerk_limited")
 
 
 def check_motion(move, limits=SPACE, corner=1e-4):
@@ -122,26 +110,21 @@ def test_straight_line(law, rng):
 def test_limits_in_space_are_of_translation_and_rotation():
     A, B = np.eye(4), se3.translation(0.3, 0, 0) @ se3.rotation("z", 0.5)
     no_turn = MotionLimits(velocity=[0.5, 0.0], acceleration=2.0)
-    no_way = MotionLimits(velocity=1.0, acceleration=[0.0, 2.0])
-    three = MotionLimits(velocity=[0.5, 1.0, 1.0], acceleration=2.0)
     for make in (
         lambda limits: straight_line(A, B, limits=limits),
-        lambda limits: circular_arc(A, [0.1, 0.2, 0.0], B, limits=limits),
         lambda limits: circle(A, [0, 1, 0], [0, 0, 1], 1.0, limits=limits, turning=True),
         lambda limits: blended_poses([A, B], limits),
     ):
         for limits, words in (
             (no_turn, "velocity of rotation"),
-            (no_way, "acceleration of translation"),
-            (three, "translation .m. and rotation .rad."),
+            (MotionLimits(velocity=1.0, acceleration=[0.0, 2.0]), "acceleration of translation"),
+            (MotionLimits([0.5, 1.0, 1.0], 2.0), "translation .m. and rotation .rad."),
         ):
-            with pytest.raises((InvalidValueError, ShapeError), match=words) as refusal:
+            with pytest.raises((InvalidValueError, ShapeError), match=words):
                 make(limits)
-            assert not re.search("joint [0-9]|[0-9] joints", str(refusal.value))
     # what does not move needs no limit, also where rounding sees a rotation
     rounded = np.eye(4)
     rounded[0, 1], rounded[1, 0] = 1e-16, -1e-16
-    assert rotation_vectors_of(rounded[:3, :3]).any()
     for start in (A, rounded):
         end = se3.translation(1, 0, 0)
         assert straight_line(start, end, limits=no_turn).duration > 2.0
@@ -159,17 +142,14 @@ def test_circles(rng):
     step = np.linalg.norm(np.diff(P, axis=0), axis=-1).max()
     assert np.linalg.norm(P - through, axis=-1).min() < step
     assert np.array_equal(arc.pose([0.0, arc.duration]), [T0, T1])
+    ask = partial(circle, T0, [0.1, 0.2, 0.3], [1.0, 1.0, 0.5], limits=SPACE)
     for turning in (False, True):
-        ring = circle(T0, [0.1, 0.2, 0.3], [1.0, 1.0, 0.5], 7.0, limits=SPACE, turning=turning)
-        check_motion(ring)
-    full = circle(T0, [0.1, 0.2, 0.3], [1.0, 1.0, 0.5], limits=SPACE)
+        check_motion(ask(7.0, turning=turning))
+    full = ask()
     assert np.abs(full.pose(full.duration) - T0).max() < 1e-14
-    with pytest.raises(InvalidValueError, match="one line"):
-        circular_arc(np.eye(4), [1.0, 0.0, 0.0], se3.translation(2.0, 0.0, 0.0), 1.0)
-    with pytest.raises(InvalidValueError, match="no length"):
-        circle(T0, [0, 0, 0], [0, 0, 0], duration=1.0)
-    with pytest.raises(InvalidValueError, match="on the axis"):
-        circle(np.eye(4), [0, 0, 1], [0, 0, 1], duration=1.0)
+    for axis, words in (([0, 0, 0], "no length"), (T0[:3, 3] - [0.1, 0.2, 0.3], "on the axis")):
+        with pytest.raises(InvalidValueError, match=words):
+            circle(T0, [0.1, 0.2, 0.3], axis, duration=1.0)
 
 
 @pytest.mark.parametrize("law", TimeLaw)
@@ -219,8 +199,7 @@ def test_flat_arcs_meet_their_points(rng, height, side):
     assert np.abs(X - [p, m, e]).max() < 2e-14 * size
     X = path.poses(np.linspace(0.0, 1.0, 201))[:, :3, 3]
     assert np.abs(((X - p) @ R)[:, 2]).max() < 2e-14 * size
-    assert np.diff((X - p) @ R[:, 0]).min() > 0.0 or height > 0.5
-    with pytest.raises(InvalidValueError, match="straight_line"):
+    with pytest.raises(InvalidValueError, match=r"one line.*straight_line"):
         circular_arc(T0, p + side * R @ [0.4, 1e-10, 0.0], T1, duration=1.0)
 
 
@@ -369,31 +348,6 @@ def test_passing_a_singular_wrist_changes_the_posture():
         assert len(path.of_kind(PathEventKind.CHANGES_POSTURE)) == 1
 
 
-def test_too_fast_near_a_singular_wrist():
-    arm = load("rx90")
-    arm = arm.with_table(arm.table.replace(velocity=np.full(6, 3.0)))
-    qa, qb = np.array([0.1, 0.3, 1.2, 0.01, 0.4, 0.2]), np.array([0.1, 0.3, 1.2, -0.01, -0.4, 0.2])
-    move = straight_line(dgm(arm, qa), dgm(arm, qb) @ se3.rotation("y", 0.01), 0.5)
-    path = joint_path(arm, move, qa, samples=500)
-    fast = path.of_kind(PathEventKind.TOO_FAST)[0]
-    assert "times its greatest velocity" in fast.detail
-    assert (np.abs(path.v[fast.first]) > 3.0).any()
-    assert (np.abs(path.v[: fast.first]) <= 3.0).all()
-
-
-def test_a_start_elsewhere_is_reported():
-    arm, q = load("rx90"), np.array(Q["rx90"])
-    T = cartesian_trajectory(dgm(arm, q), dgm(arm, q + 0.1), 20)
-    assert not joint_path(arm, T, q + 0.09).events
-    assert not joint_path(arm, T, q + 2 * np.pi * np.eye(6)[0]).events  # whole turns are kept
-    assert not joint_path(arm, T).events
-    away = np.array([0.0, 0.3, 1.0, 0.0, 0.0, 0.0])
-    path = joint_path(arm, T, q + away)
-    (event,) = path.events
-    assert (event.kind, event.first, event.last) == (PathEventKind.JUMP, 0, 0)
-    assert not path.complete
-
-
 @pytest.mark.parametrize(
     ("name", "q"),
     [
@@ -425,59 +379,45 @@ def test_redundant_arms_go_on_smoothly(name, q, monkeypatch):
         assert np.abs(np.einsum("ki,ki->k", null, step)).max() < 1e-3 * np.abs(step).max()
 
 
-def test_limits_and_whole_turns():
+def test_limits_and_speeds_that_are_exceeded_are_events():
     arm = load("kr6_r900")
     q = np.array([arm.upper[0] - 0.1, -1.0, 1.0, 0.4, 0.7, 0.6])
     way = np.tile(q, (50, 1))
     way[:, 0] += np.linspace(0.0, 0.4, 50)
-    path = joint_path(arm, dgm(arm, way), q)
+    path = joint_path(arm, dgm(arm, way), q, t=np.linspace(0.0, 0.01, 50))
     (event,) = path.of_kind(PathEventKind.OUTSIDE_LIMITS)
     assert event.first == 13
     assert "Joint 1 is outside" in event.detail
     assert np.abs(path.q - way).max() < 1e-9
     assert not path.complete
+    (fast,) = path.of_kind(PathEventKind.TOO_FAST)
+    share = 0.4 / 0.01 / arm.table.velocity[0]
+    assert (fast.first, fast.last) == (0, 49)
+    assert f"Joint 1 needs {share:.4g} times its greatest velocity" in fast.detail
 
 
-def test_joint_path_shapes_and_refusals():
-    arm = load("rx90")
-    empty = joint_path(arm, np.zeros((0, 4, 4)))
-    assert empty.q.shape == (0, 6)
-    assert empty.complete
-    T = dgm(arm, np.array([Q["rx90"]] * 3))
-    assert joint_path(arm, T[:1], Q["rx90"]).q.shape == (1, 6)
+def test_a_start_elsewhere_is_a_jump_and_a_guess_chooses_the_branch():
+    arm, q = load("rx90"), np.array(Q["rx90"])
+    T = cartesian_trajectory(dgm(arm, q), dgm(arm, q + 0.1), 20)
+    for start in (None, q + 0.09, q + 2 * np.pi * np.eye(6)[0]):  # whole turns are kept
+        assert not joint_path(arm, T, start).events
+    path = joint_path(arm, T, q + np.array([0.0, 0.3, 1.0, 0.0, 0.0, 0.0]))
+    (event,) = path.events
+    assert (event.kind, event.first, event.last) == (PathEventKind.JUMP, 0, 0)
+    assert not path.complete
+    guessed = joint_path(arm, T, q_near=q + 0.3)
+    np.testing.assert_allclose(guessed.q[0], q, rtol=0, atol=1e-9)
+    assert not guessed.events
+    empty = joint_path(arm, T[:0])
+    assert (empty.q.shape, empty.complete) == ((0, 6), True)
+    assert joint_path(arm, T[:1], q).q.shape == (1, 6)
     line = straight_line(T[0], T[0], 1.0)
-    for call, error, words in (
-        (lambda: joint_path(arm, T[0]), ShapeError, "N, 4, 4"),
-        (lambda: joint_path(arm, T, Q["rx90"][:5]), ShapeError, "q_start"),
-        (lambda: joint_path(arm, T, t=[0.0, 0.0, 1.0]), InvalidValueError, "ascend"),
-        (lambda: joint_path(arm, line, t=[0.0, 1.0]), InvalidValueError, "own times"),
-        (lambda: joint_path(arm, T, T[0, 0], T[0, 0]), InvalidValueError, "q_near"),
+    for words, poses, more in (
+        ("N, 4, 4", T[0], {}),
+        ("q_start", T, {"q_start": q[:5]}),
+        ("ascend", T, {"t": np.zeros(20)}),
+        ("own times", line, {"t": [0.0, 1.0]}),
+        ("q_near", T, {"q_start": q, "q_near": q}),
     ):
-        with pytest.raises(error, match=words):
-            call()
-
-
-def test_postures_go_on_by_the_shortest_step(rng):
-    q = rng.uniform(-np.pi, np.pi, (1, 5, 4)) + np.zeros((40, 1, 1))
-    q[:, :, 0] += np.linspace(0.0, 1.0, 40)[:, None]  # all turn through the half turn
-    q[:, :, :2] = np.remainder(q[:, :, :2] + np.pi, 2 * np.pi) - np.pi
-    order = np.array([rng.permutation(5) if k % 7 == 3 else np.arange(5) for k in range(40)])
-    mixed = np.take_along_axis(q, order[..., None], axis=1)
-    valid = np.ones((40, 5), np.bool_)
-    valid[20] = order[20] != 2  # one branch is lost
-    after = following(mixed, valid, np.array([True, True, True, False]))
-    for k in range(39):
-        for s in range(5):
-            if valid[k, s] and valid[k + 1, list(order[k + 1]).index(order[k, s])]:
-                assert order[k + 1, after[k, s]] == order[k, s]
-    assert following(mixed[:1], valid[:1], np.ones(4, np.bool_)).shape == (0, 5)
-
-
-def test_a_guess_chooses_the_branch_and_is_no_posture_of_the_path():
-    arm = load("rx90")
-    q = np.array([0.3, 0.5, 1.3, 0.4, 0.7, 0.2])
-    T = dgm(arm, q + np.linspace(0.0, 0.2, 20)[:, None])
-    path = joint_path(arm, T, q_near=q + 0.3)
-    np.testing.assert_allclose(path.q[0], q, rtol=0, atol=1e-9)
-    assert not path.of_kind(PathEventKind.JUMP)
-    assert joint_path(arm, T, q + 0.3).of_kind(PathEventKind.JUMP)
+        with pytest.raises((ShapeError, InvalidValueError), match=words):
+            joint_path(arm, poses, **more)

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from test_viz_figures import data, labels, legend, lines
+from test_viz_figures import data, lines
 
 import robotmodels as rm
 from robotmodels import calibration as cal
@@ -55,7 +55,6 @@ def calibrated():
 def test_residuals_are_those_of_the_result(calibrated):
     figure = viz.plot_calibration_residuals(calibrated["few"])
     (part,) = measured_residuals(calibrated["few"])
-    assert labels(figure)[::2] == ["x (mm)", "y (mm)", "z (mm)", "rx (deg)", "ry (deg)", "rz (deg)"]
     for k in range(6):
         factor = 1e3 if k < 3 else DEGREES
         words = ("before: base and tool fitted", "after the calibration")
@@ -63,8 +62,6 @@ def test_residuals_are_those_of_the_result(calibrated):
             figure.axes[2 * k :], (part.before, part.after), words, strict=False
         ):
             np.testing.assert_allclose(data(axes, word), factor * values[:, k])
-            rms = np.sqrt(np.mean((factor * values[:, k]) ** 2))
-            assert axes.get_title(loc="right").startswith(f"rms {rms:.3g} ")
     (part,) = measured_residuals(calibrated["many"])
     assert {3, 77} <= set(np.flatnonzero(part.outlier))
     after = viz.plot_calibration_residuals(calibrated["many"]).axes[1]
@@ -93,14 +90,11 @@ def test_parameters_and_correlations_are_those_of_the_result(calibrated):
         expected = (result.corrections[k], *interval[k])
         np.testing.assert_allclose(shown.pop(name), expected, atol=1e-12)
     assert shown == {}
-    assert "90 % intervals" in figure.legends[0].get_title().get_text()
     axes = viz.plot_calibration_correlations(result).axes[0]
     names = [text.get_text() for text in axes.get_yticklabels()]
     k = [result.names.index(name) for name in names]
     values = np.asarray(axes.collections[0].get_array())
     np.testing.assert_array_equal(values, result.correlation[np.ix_(k, k)])
-    rows = [result.parameters.entries[i].row for i in k]
-    assert rows == sorted(rows)  # from the base to the end
 
 
 def truth_drawn(figure):
@@ -147,22 +141,16 @@ def arrow_lengths(axes):
 def test_arrows_in_space_are_the_errors_magnified(calibrated):
     (part,) = measured_residuals(calibrated["few"])
     figure = viz.plot_calibration_in_space(calibrated["few"], magnification=250.0)
-    assert "arrows x 250" in figure.texts[1].get_text()
     expected = 250.0 * np.linalg.norm(part.after[:, :3], axis=1)
     drawn = arrow_lengths(figure.axes[1])[: len(expected)]
     np.testing.assert_allclose(np.sort(drawn), np.sort(expected), rtol=1e-6)
     # places far apart have panels of their own
     figure = viz.plot_calibration_in_space(calibrated["sockets"])
-    parts = [p for p in measured_residuals(calibrated["sockets"]) if p.measurement.views]
     assert len(figure.axes) == 6
-    for row, part in enumerate(parts):
-        for side, word in enumerate(("before", "after")):
-            axes, text = figure.axes[2 * row + side], figure.texts[2 * row + side].get_text()
-            rms = 1e3 * np.sqrt(np.mean(np.sum(getattr(part, word) ** 2, axis=1)))
-            assert text.startswith(f"{part.measurement.name}, {word}: rms {rms:.3g} mm")
-            extent = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1).max()
-            assert extent < 150.0  # mm; the places are 1 m apart
-            assert arrow_lengths(axes).max() > 0.1 * extent
+    for axes in figure.axes:
+        extent = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1).max()
+        assert extent < 150.0  # mm; the places are 1 m apart
+        assert arrow_lengths(axes).max() > 0.1 * extent
 
 
 def test_selection_shows_its_numbers():
@@ -176,8 +164,8 @@ def test_selection_shows_its_numbers():
         values = factor * selected.standard_errors[:, own]
         np.testing.assert_allclose(data(axes, "median"), np.median(values, axis=1))
         np.testing.assert_allclose(data(axes, "largest"), values.max(axis=1))
-    enough = f"enough: {selected.enough(0.05)}"
-    assert legend(figure) == ["each parameter", "largest", "median", enough]
+    (enough,) = lines(figure.axes[0], f"enough: {selected.enough(0.05)}")
+    assert enough.get_xdata()[0] == selected.enough(0.05)
 
 
 # ---------------------------------------------------------------- identification
@@ -205,7 +193,6 @@ def found():
 def test_torques_are_those_of_the_log_and_the_result(found):
     test = log_of(found.model, seconds=4.0, seed=1)
     figure = viz.plot_identification_torques(found, test)
-    assert labels(figure)[::2] == ["force (N)", "torque (N m)", "torque (N m)"]
     log, edges = found.equations.log, found.equations.processing.edges
     used = np.concatenate([log.tau[edges : 3500 - edges], log.tau[3500 + edges : -edges]])
     for j in range(3):
@@ -215,14 +202,9 @@ def test_torques_are_those_of_the_log_and_the_result(found):
         )
         assert np.nanmax(measured) == used[:, j].max()  # envelopes keep every peak
         assert np.nanmin(measured) == used[:, j].min()
-        assert np.isnan(measured).sum() == 1  # between the recordings
         rmse = found.validation.in_sample.rmse[j]
         assert 0.5 * rmse < np.nanstd(rest) < 4.0 * rmse
         assert np.nanstd(predicted) == pytest.approx(used[:, j].std(), rel=0.1)
-        relative = 100 * found.validation.held_out.relative[j]
-        title = figure.axes[2 * j + 1].get_title(loc="left")
-        assert title.endswith(f"held out: {relative:.3g} %")
-    assert legend(figure) == ["measured", "measured less predicted", "predicted", "dead band"]
 
 
 def test_residuals_their_band_and_their_correlation(found):
@@ -233,9 +215,9 @@ def test_residuals_their_band_and_their_correlation(found):
         assert np.isfinite(e).sum() == found.factors.counts[j]
         low, height = left.patches[0].get_y(), left.patches[0].get_height()
         assert (low, height) == pytest.approx((-2.0 * sigma, 4.0 * sigma))
-        share = 100.0 * np.mean(np.abs(e[np.isfinite(e)]) > 2.0 * sigma)
-        assert f"{share:.2g} % outside" in left.get_title(loc="left")
-        assert right.get_xlim()[1] > 0.0
+        white = found.factors.counts[j] ** -0.5
+        shown = np.array([line[1, 1] for line in right.collections[1].get_segments()])
+        assert np.quantile(np.abs(shown), 0.5) < 4.0 * white
     held_out = viz.plot_identification_residuals(found, log_of(found.model, seconds=4.0, seed=1))
     assert data(held_out.axes[0], "residual; its autocorrelation").size < e.size
 
@@ -272,8 +254,6 @@ def test_processing_shows_cutoffs_and_the_noise_they_cut(found):
         )
         assert (after[f > 2.0 * cutoff] < 0.1 * before[f > 2.0 * cutoff]).all()
         np.testing.assert_allclose(after[f < 0.5 * cutoff], before[f < 0.5 * cutoff], rtol=0.15)
-    noise = float(re.search(r": (\S+) m", figure.axes[0].get_title(loc="left"))[1])
-    assert noise == pytest.approx(1e-5 * np.sqrt(1.0 - 2.0 * DT * chosen.cutoff), rel=0.1)
     bias, count = viz.plot_processing(found).axes[6:]
     # one equation of each joint for each sample that is kept
     expected = len(log) * 3 / chosen.decimation / len(found.base)
@@ -285,9 +265,7 @@ def test_excitation_shows_its_motion_and_its_search():
     arm = rm.load("lab_trr")
     drawn = exciting_trajectory(arm, starts=2, baseline=4, iterations=4, rng=0)
     figure = viz.plot_excitation(drawn)
-    assert labels(figure)[:3] == ["position (m)", "position (rad)", "velocity (m/s)"]
     names = list(arm.table.joint_names)
-    assert legend(figure)[:3] == names
     t = lines(figure.axes[1], names[2])[0].get_xdata()
     np.testing.assert_allclose(data(figure.axes[1], names[2]), drawn.trajectory.q(t)[:, 2])
     search, baseline = figure.axes[-2:]

@@ -19,7 +19,7 @@ from robotmodels.cli import main
 from robotmodels.errors import RobotModelsError, RobotModelsWarning, UrdfError
 from robotmodels.kinematics.ellipsoids import OtherPart, TwistPart
 from robotmodels.viz.camera import FIELD_OF_VIEW, framed
-from robotmodels.viz.shapes import Label, Segments, Triangles, apply
+from robotmodels.viz.shapes import Triangles, apply
 
 H = np.pi / 2
 Q = np.array([0.4, 0.7, 0.8, 0.4, 0.9, 0.6])
@@ -70,10 +70,6 @@ def frame_path(scene, name):
     return f"{path}/q" if f"{path}/q" in scene.paths else path
 
 
-def shapes(scene):
-    return [node for node in scene.nodes if node.shape is not None]
-
-
 def links(scene):
     return [node for node in scene.nodes if "/shape:" in node.path]
 
@@ -122,8 +118,6 @@ def test_postures_over_each_other_and_beside_each_other():
     assert shifts[1][0] > 0.5
     assert shifts[2][1] < -0.5
     np.testing.assert_allclose(shifts[3], shifts[1] + shifts[2], atol=1e-14)
-    numbers = [n.shape.text for n in beside.nodes if isinstance(n.shape, Label)]
-    assert numbers == ["1", "2", "3", "4", "5"]
 
 
 def test_colors_and_legend():
@@ -218,14 +212,10 @@ def test_tool_path_is_where_the_tool_goes():
 
 
 def test_sliders_are_the_independent_joints_in_their_limits():
-    for model in (RX90, SCARA, TREE, rm.load("tx40")):  # coupled motors leave joints independent
-        panel = rm.viz.jog(model).sliders
-        assert panel.independent.tolist() == list(range(model.n))
+    assert rm.viz.jog(rm.load("tx40")).sliders.independent.size == 6  # only motors are coupled
     scene = rm.viz.jog(MIMIC)
     panel = content(scene)["panel"]
     assert [joint["leads"] for joint in panel["joints"]] == [True, False, True, False]
-    assert panel["matrix"] == [[1, 0], [0, 0], [0, 1], [3, 0]]
-    assert panel["offset"] == [0, 0.1, 0, 0.3]
     for name, T in zip(MIMIC.table.names, rm.link_poses(MIMIC, scene.sliders.q), strict=True):
         np.testing.assert_allclose(scene.pose(frame_path(scene, name)), T, atol=1e-12)
     table = rm.DHTable(antecedent=[0, 1, 2], sigma=[0, 1, 0], mu=[1, 0, 1],
@@ -276,6 +266,14 @@ def test_the_surface_is_the_ellipsoid_at_the_tool_to_scale(function):
     assert scale_of(asked.legend[0][0]) == 0.37
 
 
+def test_an_ellipsoid_of_a_singular_position_is_a_bar():
+    line = rm.velocity_ellipsoid(PLANAR, [0.4, 0.0])
+    bar = rm.viz.show(PLANAR, [0.4, 0.0], ellipsoids=line)
+    assert "ellipsoids/1/surface" not in bar.paths
+    along = (surface(bar, "ellipsoids/1/axis_1") - line.centre) @ line.axes[:, 0]
+    assert along.max() == pytest.approx(scale_of(bar.legend[0][0]) * line.radii[0])
+
+
 @pytest.mark.parametrize("q", [[0.4, 1.2], [0.4, 0.0], [0.4, 0.02]])
 def test_a_long_ellipsoid_is_cut_on_its_own_surface(q):
     ellipsoid = rm.force_ellipsoid(PLANAR, q)
@@ -295,17 +293,6 @@ def test_a_long_ellipsoid_is_cut_on_its_own_surface(q):
         assert (np.abs(bar[:, k]).max() > 1.1 * reach[k]) == long[k]
 
 
-def test_flat_ellipsoids_are_discs_bars_and_dots():
-    disc = rm.viz.show(PLANAR, [0.4, 1.2], ellipsoids=rm.velocity_ellipsoid(PLANAR, [0.4, 1.2]))
-    points = surface(disc)
-    assert np.ptp(points[:, 2]) < 1e-7 < 0.1 < np.ptp(points[:, 0])
-    line = rm.velocity_ellipsoid(PLANAR, [0.4, 0.0])
-    bar = rm.viz.show(PLANAR, [0.4, 0.0], ellipsoids=line)
-    assert "ellipsoids/1/surface" not in bar.paths
-    along = (surface(bar, "ellipsoids/1/axis_1") - line.centre) @ line.axes[:, 0]
-    assert along.max() == pytest.approx(scale_of(bar.legend[0][0]) * line.radii[0])
-
-
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.nightly
 def test_any_robot_gives_a_page_and_a_figure(seed):
@@ -319,15 +306,13 @@ def test_any_robot_gives_a_page_and_a_figure(seed):
         for other in OtherPart
     ]
     scene = rm.viz.show(model, q, ellipsoids=kinds)
-    for node in scene.nodes:
-        if isinstance(node.shape, (Triangles, Segments)):
-            assert np.isfinite(
-                getattr(node.shape, "vertices", getattr(node.shape, "points", 0))
-            ).all()
+    shapes = [node.shape for node in scene.nodes]
+    points = [shape.vertices for shape in shapes if isinstance(shape, Triangles)]
     matrices = [c["matrix"] for c in content(scene)["commands"] if c["type"] == "set_transform"]
-    assert np.isfinite(matrices).all()
-    for axes in rm.viz.plot_ellipsoids(kinds).axes:
-        assert all(np.isfinite(line.get_xydata()).all() for line in axes.lines)
+    drawn = [
+        line.get_xydata() for axes in rm.viz.plot_ellipsoids(kinds).axes for line in axes.lines
+    ]
+    assert all(np.isfinite(each).all() for each in (*points, *matrices, *drawn))
 
 
 # ---------------------------------------------------------------- the page
@@ -343,10 +328,7 @@ def test_a_page_is_one_offline_file_the_same_each_time(tmp_path):
     with ThreadPoolExecutor(3) as pool:
         draw = lambda _: rm.viz.animate(RX90, q, frames=True, names=True).html()  # noqa: E731
         assert [*pool.map(draw, range(3))] == [text] * 3
-    frame = rm.viz.show(RX90, height=321)._repr_html_()
-    assert frame.startswith('<iframe srcdoc="<!DOCTYPE html>')
-    assert "height: 321px" in frame
-    assert frame.count('"') == 4  # nothing inside the page ends the attribute
+    assert rm.viz.show(RX90)._repr_html_().count('"') == 4  # nothing inside ends the attribute
 
 
 def test_names_cannot_break_out_of_the_page():
@@ -422,7 +404,11 @@ def test_a_mesh_has_its_place_scale_and_colour_and_is_in_the_page_once(tmp_path)
 QUINTIC = tr.quintic(np.zeros(6), np.ones(6), 1.0)
 STRAIGHT = tr.straight_line(np.eye(4), np.eye(4), duration=1.0)
 BALL = rm.velocity_ellipsoid(RX90, Q)
+LOST = tr.JointPath(
+    np.arange(3.0), [Q, Q, Q * np.nan], np.zeros((3, 6)), np.zeros(3), np.ones(3), ["", "", ""], ()
+)
 MISTAKES = (
+    (lambda: rm.viz.animate(RX90, LOST), r"the first is pose 2; .*q\[:2\]"),
     (lambda: rm.viz.show(RX90, np.zeros((0, 6))), "q: expected one posture"),
     (lambda: rm.viz.show([RX90, SCARA], [np.zeros(6)]), "each of the 2 robots"),
     (lambda: rm.viz.show("rx90"), "model: expected a RobotModel"),
@@ -442,15 +428,6 @@ MISTAKES = (
 def test_mistakes_are_named(wrong, message):
     with pytest.raises(RobotModelsError, match=message):
         wrong()
-
-
-def test_a_path_that_is_not_reached_says_which_part_is():
-    goal = rm.dgm(RX90, Q)
-    goal[0, 3] += 2.0
-    path = tr.joint_path(RX90, tr.straight_line(rm.dgm(RX90, Q), goal, 1.0), Q, samples=50)
-    first = int(np.isnan(path.q[:, 0]).argmax())
-    with pytest.raises(RobotModelsError, match=rf"the first is pose {first}; .*q\[:{first}\]"):
-        rm.viz.animate(RX90, path)
 
 
 def test_the_command_opens_a_page_where_there_is_a_display(tmp_path, monkeypatch, capsys):
