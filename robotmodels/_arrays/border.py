@@ -121,6 +121,27 @@ def as_number(
     return number
 
 
+def as_each(
+    value: ArrayLike | None,
+    count: int,
+    name: str,
+    least: float = -np.inf,
+    above: float = -np.inf,
+    finite: bool = False,
+    default: float = np.nan,
+) -> Array:
+    """One number for all or one for each, perhaps infinite, within bounds. Shapes: -> (count,)."""
+    array = as_reals(default if value is None else value, name)
+    if array.shape not in ((), (count,)):
+        raise ShapeError(f"{name}: expected one number or shape ({count},), got {array.shape}.")
+    fits = (array >= least) & ((array > above) | (above == -np.inf))
+    if not (fits & (np.abs(array) < np.inf) if finite else fits).all():
+        words = " finite" * finite + " numbers"
+        words += f" above {above:g}" if above > -np.inf else f" of at least {least:.3g}"
+        raise InvalidValueError(f"{name}: expected{words}, got {array.tolist()!r:.60}.")
+    return np.broadcast_to(array, (count,)).copy()
+
+
 def as_count(value: Any, name: str, least: int = 1, most: int | None = None) -> int:
     """A whole number within bounds, such as a number of samples."""
     try:

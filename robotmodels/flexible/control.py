@@ -44,7 +44,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Frozen, Value, as_exact, as_floats, as_number
+from .._arrays import Array, Frozen, Value, as_each, as_exact, as_floats, as_number
 from .._choices import one_of
 from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError
@@ -52,7 +52,7 @@ from ..trajectories import Trajectory
 from ..trajectories.motions import PiecewisePolynomial
 from .linear import DeflectionStatus, scales, static_deflection
 from .models import idm, mass_matrix, solved
-from .robot import FlexibleRobot, check_arm, each
+from .robot import FlexibleRobot, check_arm
 
 Law = Callable[[float, Array, Array, Array, Array], Array]
 _FACTORS = 2  # free coefficients of each joint, for each elastic condition that one joint has
@@ -75,7 +75,8 @@ def regulator(
     """Regulation: ``kp (q_goal - q) - kd v`` and the torque that holds the arm at the goal."""
     n = check_arm(arm).n
     goal = np.zeros(n) if q_goal is None else as_exact(q_goal, (n,), "q_goal").copy()
-    P, D, found = _gains(kp, n, "kp"), _gains(kd, n, "kd"), static_deflection(arm, goal)
+    P, D = (as_each(gain, n, "kp, kd", above=0.0, finite=True) for gain in (kp, kd))
+    found = static_deflection(arm, goal)
     if np.isnan(found.tau).any():
         raise InvalidValueError(f"q_goal: the arm has no equilibrium there. {found.reason()}")
     hold = found.tau
@@ -85,7 +86,8 @@ def regulator(
 def joint_tracking(arm: FlexibleRobot, reference: Any, kp: ArrayLike, kd: ArrayLike) -> Law:
     """Tracking of joint motions: the inverse model with the errors of the motors."""
     n = check_arm(arm).n
-    P, D, at = _gains(kp, n, "kp"), _gains(kd, n, "kd"), motion_of(reference, n)
+    P, D = (as_each(gain, n, "kp, kd", above=0.0, finite=True) for gain in (kp, kd))
+    at = motion_of(reference, n)
 
     def law(t: float, q: Array, v: Array, e: Array, e_v: Array) -> Array:
         qd, vd, ad = at(t)
@@ -111,13 +113,6 @@ def motion_of(reference: Any, n: int) -> Callable[[float], list[Array]]:
 
     at(0.0)
     return at
-
-
-def _gains(value: ArrayLike, n: int, name: str) -> Array:
-    gains = each(value, n, name)
-    if not (np.isfinite(gains) & (gains > 0.0)).all():
-        raise InvalidValueError(f"{name}: expected positive gains, got {gains.tolist()}.")
-    return gains
 
 
 # --- rest to rest --------------------------------------------------------------------------------

@@ -8,10 +8,10 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from .._arrays import Array, Value, as_reals, read_only
-from ..errors import InvalidValueError, ShapeError
+from .._arrays import Array, Value, as_each, read_only
+from ..errors import InvalidValueError
 from ..kernels import Chain
 from ..model import RobotModel, check_model
 from .link import FlexibleLink
@@ -95,19 +95,12 @@ class FlexibleRobot(Value):
         model = self.model
         links = _checked_links(model, self.links)
         n, modes = model.n, sum(link.m for link in links.values())
-        stiffness = each(self.joint_stiffness, n, "joint_stiffness", np.inf)
-        if not (stiffness > 0.0).all():
-            raise InvalidValueError(
-                f"joint_stiffness: expected positive numbers or infinity, got {stiffness.tolist()}."
-            )
+        stiffness = as_each(self.joint_stiffness, n, "joint_stiffness", above=0.0, default=np.inf)
         joints = np.flatnonzero(np.isfinite(stiffness))
-        damping = each(self.joint_damping, n, "joint_damping", 0.0)
-        modal = each(self.modal_damping, modes, "modal_damping", 0.0)
-        for name, values in (("joint_damping", damping), ("modal_damping", modal)):
-            if not ((values >= 0.0) & np.isfinite(values)).all():
-                raise InvalidValueError(
-                    f"{name}: expected numbers from 0, got {values.tolist()}; energy would grow."
-                )
+        damping, modal = (
+            as_each(getattr(self, name), count, name, least=0.0, finite=True, default=0.0)
+            for name, count in (("joint_damping", n), ("modal_damping", modes))
+        )
         drives = model.drive_matrices
         coupled = drives is not None and (
             drives.coupling.size or (drives.rotor != np.diag(np.diag(drives.rotor))).any()
@@ -190,14 +183,6 @@ def _checked_links(model: RobotModel, links: Any) -> dict[int, FlexibleLink]:
                 f"links: row {row} is a sliding joint; put the link on a fixed row behind it."
             )
     return {int(row): links[row] for row in sorted(links)}
-
-
-def each(value: ArrayLike | None, count: int, name: str, default: float = np.nan) -> Array:
-    """One number for all, an array, or the default. Shapes: -> (count,)."""
-    array = as_reals(default if value is None else value, name)
-    if array.shape not in ((), (count,)):
-        raise ShapeError(f"{name}: expected one number or shape ({count},), got {array.shape}.")
-    return np.broadcast_to(array, (count,)).copy()
 
 
 def _parts_of(arm: FlexibleRobot) -> Parts:

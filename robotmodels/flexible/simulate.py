@@ -56,7 +56,7 @@ from ..errors import InvalidValueError, SingularMassMatrixError
 from ..geometry import DHTable
 from ..model import RobotModel
 from ..simulation import Integrator
-from ..simulation.simulate import times_of
+from ..simulation.simulate import law_of, times_of
 from .linear import scales
 from .link import FlexibleLink
 from .models import SpinStatus, cross, ddm, dgm, in_world, jacobian, recursion, solved, states
@@ -184,18 +184,20 @@ def simulate(
 
 def _law(law: Any, size: int, name: str) -> Callable[..., Array]:
     """Function (t, q, e, v, e_v) -> (size,) of a user's function or of constant values."""
-    if not callable(law):
-        values = as_exact(np.zeros(size) if law is None else law, (size,), name)
-        return lambda t, q, e, v, ev: values
-    for count in (5, 3, 1):
-        with suppress(TypeError, ValueError):  # another number of arguments
-            signature(law).bind(*range(count))
-            return lambda t, q, e, v, ev: as_exact(
-                law(t, *(x.copy() for x in (q, v, e, ev)[: count - 1])),  # type: ignore[reportArgumentType]
-                (size,),
-                f"{name} at t = {t:.9g} s",
+    if callable(user := law):
+        for count in (5, 3, 1):
+            with suppress(TypeError, ValueError):  # another number of arguments
+                signature(user).bind(*range(count))
+                break
+        else:
+            raise InvalidValueError(
+                f"{name}: expected a function of t, (t, q, v) or (t, q, v, e, e_v)."
             )
-    raise InvalidValueError(f"{name}: expected a function of t, (t, q, v) or (t, q, v, e, e_v).")
+
+        def law(t: float, q: Array, e: Array, v: Array, ev: Array) -> Any:
+            return user(t, *(q, v, e, ev)[: count - 1])
+
+    return law_of(np.zeros(size) if law is None else law, size, None, name)[0]
 
 
 def _followed(

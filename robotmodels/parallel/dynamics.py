@@ -250,7 +250,10 @@ def simulate(
         raise ShapeError(f"t: expected a duration above 0, or ascending times (N,), got {t!r:.60}.")
     times = np.linspace(first, last, 201) if times is None else times
     rtol, atol = as_number(rtol, "rtol", least=1e-13), as_number(atol, "atol", above=0.0)
-    drive, load = _law(control, robot.m, times, "control"), _law(wrench, 6, times, "wrench")
+    drive, load = (
+        law_of(np.zeros(size) if law is None else law, size, times, name)[0]
+        for law, size, name in ((control, robot.m, "control"), (wrench, 6, "wrench"))
+    )
     for model, x in ((idm, np.zeros(6)), (ddm, np.zeros(robot.m))):
         model(robot, T0, V, x, mode=mode)  # raises for what cannot start
     columns, unit = list(robot.columns), scales(robot, robot.length)
@@ -301,10 +304,3 @@ def simulate(
     tau = np.array([drive(*row) for row in zip(found.t, T, V, strict=True)])
     q = leg_states(robot, T, modes_of(robot, mode, (len(T),))).q
     return ParallelMotion(found.t, T, V, q, tau, energy - energy[0] - found.y[13], status)
-
-
-def _law(law: Any, size: int, t: Array, name: str) -> Callable[[float, Array, Array], Array]:
-    """A function of (t, T, V) from one, a constant, rows or nothing."""
-    function = law_of(np.zeros(size) if law is None else law, size, t, name)[0]
-    assert function is not None
-    return lambda time, T, V: function(time, T.copy(), V.copy())

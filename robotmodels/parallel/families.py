@@ -54,10 +54,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, as_exact, as_floats, as_number
+from .._arrays import Array, as_each, as_exact, as_floats, as_number
 from ..errors import InvalidValueError, ShapeError
 from .legs import leg_states
-from .robot import Family, ParallelRobot, for_legs, pose_at
+from .robot import Family, ParallelRobot, pose_at
 
 Points = ArrayLike
 Limit = ArrayLike | None
@@ -184,7 +184,7 @@ def _robot(
                 f"base, platform: legs {i + 1} and {j + 1} coincide; give each its own anchors."
             )
     crank, rod = (
-        np.zeros(m) if arms is None else for_legs(as_floats(value, name), m, name, 1e-300)
+        np.zeros(m) if arms is None else as_each(as_floats(value, name), m, name, above=0.0)
         for value, name in zip(arms or (0, 0), names[2:], strict=True)
     )
     low, high = checked_limits(*limits[:2], m, arms is None)
@@ -199,8 +199,8 @@ def _robot(
 def checked_limits(lower: Limit, upper: Limit, m: int, is_length: bool) -> tuple[Array, Array]:
     """Limits of q, infinite or zero where there are none."""
     least = 0.0 if is_length else -np.inf
-    low = for_legs(least if lower is None else lower, m, "lower", least)
-    high = for_legs(np.inf if upper is None else upper, m, "upper", least)
+    low = as_each(least if lower is None else lower, m, "lower", least)
+    high = as_each(np.inf if upper is None else upper, m, "upper", least)
     if not (low <= high).all():
         raise InvalidValueError(f"lower, upper: expected lower below upper, got {low} and {high}.")
     return low, high

@@ -10,7 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, Value, as_core, as_exact, as_floats, as_number, as_reals, read_only
+from .._arrays import (
+    Array,
+    Value,
+    as_core,
+    as_each,
+    as_exact,
+    as_floats,
+    as_number,
+    read_only,
+)
 from .._outcomes import Result
 from ..errors import InvalidValueError, ShapeError
 from ..se3.orientation import rotation_vectors_of
@@ -196,7 +205,7 @@ class ParallelRobot(Value):
             )
         least = (0.0, -np.inf, 0.0)
         both = [
-            as_floats([for_legs(part[k], self.m, "legs", least[k]) for k in range(3)], "legs").T
+            as_floats([as_each(part[k], self.m, "legs", least[k]) for k in range(3)], "legs").T
             for part in parts
         ]
         g = self.gravity if gravity is None else as_exact(gravity, (3,), "gravity")
@@ -210,19 +219,6 @@ class ParallelRobot(Value):
         limits = "no limits" if (self.lower.min(), self.upper.max()) == none else limits
         words = "with" if self.masses is not None else "without"
         return f"<{self.family.value[0]}: {self.m} legs of actuated {q}, {limits}, {words} masses>"
-
-
-def for_legs(value: ArrayLike, m: int, name: str, least: float = -np.inf) -> Array:
-    """A number or one for each leg, perhaps infinite, from a least one. Shapes: -> (m,)."""
-    given = as_reals(value, name)
-    if given.shape not in ((), (m,)):
-        raise ShapeError(f"{name}: expected a number or shape ({m},), got {given.shape}.")
-    if not (given >= least).all():
-        words = {0.0: "numbers that are not negative", -np.inf: "numbers"}
-        raise InvalidValueError(
-            f"{name}: expected {words.get(least, 'lengths above 0 m')}, got {value!r:.60}."
-        )
-    return np.broadcast_to(given, (m,))
 
 
 def only_freedoms(robot: ParallelRobot, V: Array) -> Array:

@@ -131,17 +131,17 @@ def stateful(control: StatefulControl, n: int) -> Feedback:
     if state0.ndim != 1:
         raise ShapeError(f"control.state0: expected shape (k,), got {state0.shape}.")
     return Feedback(
-        checked(control.command, n, "control.command", "t, q, v, x"),
-        checked(control.rate, state0.size, "control.rate", "t, q, v, x"),
+        checked(control.command, n, "control.command"),
+        checked(control.rate, state0.size, "control.rate"),
         state0.copy(),
     )
 
 
-def checked(law: Callable[..., Any], size: int, name: str, words: str) -> Callable[..., Array]:
-    """User function with checks of its values."""
+def checked(law: Callable[..., Any], size: int, name: str) -> Callable[..., Array]:
+    """User function of time and state with checks of its values."""
 
     def value(t: float, *state: Array) -> Array:
-        where = f"{name}({words}) at t = {t:.9g} s"
+        where = f"{name} at t = {t:.9g} s"
         try:
             answer = law(t, *(x.copy() for x in state))
         except Exception as error:

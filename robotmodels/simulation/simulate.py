@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_exact, as_floats, as_reals
+from .._arrays import Array, as_each, as_exact, as_floats, as_number
 from .._arrays.tasks import Progress
 from .._choices import chosen
 from ..drive import check_all_or_none
@@ -19,7 +19,7 @@ from ..model import RobotModel, check_model
 from .dry_friction import check_dissipates
 from .feedback import Feedback, StatefulControl, checked, sampling, stateful
 from .integration import Integration
-from .motion import Law, Motion
+from .motion import Motion
 from .result import Integrator, Simulation
 
 _FINEST = 100 * float(np.finfo(np.float64).eps)
@@ -139,7 +139,7 @@ def simulate(
     push, push_knots = law_of(disturbance, n, times, "disturbance")
     if friction is not None:
         check_friction(friction, n)
-    width = None if smoothing is None else _positive(smoothing, "smoothing", (n,))
+    width = None if smoothing is None else as_each(smoothing, n, "smoothing", above=0.0)
     if (jumps := as_floats(breaks, "breaks")).ndim != 1:
         raise ShapeError(f"breaks: expected times of shape (K,), got {jumps.shape}.")
     every, wait = sampling(period, delay)
@@ -152,12 +152,12 @@ def simulate(
     cuts = [(float(x), x in held) for x in (start, *inside, end)]
     if max_evaluations is None:  # default: a few seconds of computing time
         max_evaluations = int(min(100_000 + 1e4 * (end - start) + 200 * len(cuts), 2**62))
-    budget = int(_positive(max_evaluations, "max_evaluations", least=1))
+    budget = int(as_number(max_evaluations, "max_evaluations", least=1.0))
     integrator = chosen(Integrator, method, "method")
     tolerances = {
-        "rtol": float(_positive(rtol, "rtol", least=_FINEST)),
-        "atol": float(_positive(atol, "atol")),
-        "max_step": float(_positive(max_step, "max_step")),
+        "rtol": as_number(rtol, "rtol", least=_FINEST),
+        "atol": as_number(atol, "atol", above=0.0),
+        "max_step": float(as_each(max_step, 1, "max_step", above=0.0)[0]),
     }
     limits = _limits(model, q) if stop_at_limits else None
     motion = Motion(model, law, tool, drive, friction, width, push)
@@ -192,23 +192,24 @@ def followed(
     )
 
 
-def law_of(law: Any, size: int, t: Array | None, name: str) -> tuple[Law | None, Array]:
-    """Function (t, q, v) -> (size,) of a function, constant values or rows; times of its kinks."""
+def law_of(law: Any, size: int, t: Array | None, name: str) -> tuple[Any, Array]:
+    """Function of time and state -> (size,) of one, of constants or of rows; times of its kinks.
+
+    None for None. The answers of a user's function are checked.
+    """
     none = np.empty(0)
-    if law is None:
-        return None, none
-    if callable(law):
-        return checked(law, size, name, "t, q, v"), none
+    if law is None or callable(law):
+        return law and checked(law, size, name), none
     values = as_floats(law, name).copy()
     if values.shape == (size,):
-        return lambda time, q, v: values, none
+        return lambda time, *state: values, none
     if t is None or values.shape != (len(t), size):
         rows = " (rows need the times t)" if t is None else f" or ({len(t)}, {size})"
         raise ShapeError(
-            f"{name}: expected a function {name}(t, q, v) -> ({size},), or an array of shape "
+            f"{name}: expected a function of time and state -> ({size},), or an array of shape "
             f"({size},){rows}, got shape {values.shape}."
         )
-    return lambda time, q, v: np.array([np.interp(time, t, x) for x in values.T]), t[1:-1]
+    return lambda time, *state: np.array([np.interp(time, t, x) for x in values.T]), t[1:-1]
 
 
 def times_of(t: ArrayLike) -> tuple[float, float, Array | None]:
@@ -225,16 +226,6 @@ def times_of(t: ArrayLike) -> tuple[float, float, Array | None]:
             f"t: expected ascending times, got {times[k]} s and then {times[k + 1]} s at [{k + 1}]."
         )
     return float(times[0]), float(times[-1]), times.copy()
-
-
-def _positive(value: Any, name: str, shape: tuple[int, ...] = (), least: float = 1e-300) -> Array:
-    """One positive number, or an array of this shape; infinity is allowed."""
-    array = as_reals(value, name)
-    if array.shape not in ((), shape):
-        raise ShapeError(f"{name}: expected one number or shape {shape}, got {array.shape}.")
-    if not (array >= least).all():
-        raise InvalidValueError(f"{name}: expected at least {least:.2g}, got {value!r:.60}.")
-    return np.broadcast_to(array, shape).copy()
 
 
 def _limits(model: RobotModel, q: Array) -> tuple[Array, Array]:
