@@ -1,8 +1,6 @@
-"""Base parameters: rules against numbers, torques kept, SYMORO's tables, what the book prints."""
+"""Base parameters: rules against numbers, torques kept, what the book prints."""
 
-import json
 import pickle
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,13 +27,11 @@ KINDS = (True, False, ("Ia", "Fv", "Fc"), ("Ia",), ("Fv", "offset"), ())
 def any_robot(rng):
     """Anything: trees, fixed frames, gamma and b, oblique axes, rotated bases, gravity or none."""
     f = int(rng.integers(1, 9))
-    table = random_table(rng, f, tree=bool(rng.random() < 0.4), fixed=bool(rng.random() < 0.3))
+    table = random_table(rng, f, bool(rng.random() < 0.4), fixed=bool(rng.random() < 0.3))
     # between parallel and not parallel there is a range that no rank can decide
-    beta = np.where(abs(table.beta) < 1e-2, 0.0, table.beta)
+    table = table.replace(beta=np.where(abs(table.beta) < 1e-2, 0.0, table.beta))
     base = None if rng.random() < 0.5 else random_pose(rng)
     gravity = rng.normal(size=3) if rng.random() < 0.3 else GRAVITIES[rng.integers(4)]
-    columns = {c: getattr(table, c) for c in ("gamma", "b", "alpha", "d", "theta", "r")}
-    table = rm.DHTable(antecedent=table.antecedent, sigma=table.sigma, beta=beta, **columns)
     return rm.RobotModel.from_table(table, base=base, gravity=gravity)
 
 
@@ -47,16 +43,11 @@ def right_angled_robot(rng):
     sigma = rng.choice([0, 0, 1, 1, 2] if rng.random() < 0.3 else [0, 1], size=f)
     if (sigma == 2).all():
         sigma[0] = 0
-
-    def angles():
-        return rng.integers(-2, 3, size=f) * np.pi / 2 * (rng.random(f) < 0.6)
-
-    def lengths():
-        return np.where(rng.random(f) < 0.6, 0.0, rng.choice([0.3, 0.5], size=f))
-
+    angles = rng.integers(-2, 3, (3, f)) * np.pi / 2 * (rng.random((3, f)) < 0.6)
+    lengths = np.where(rng.random((3, f)) < 0.6, 0.0, rng.choice([0.3, 0.5], (3, f)))
     table = rm.DHTable(
-        antecedent=antecedent, sigma=sigma, alpha=angles(), d=lengths(), theta=angles(),
-        r=lengths(), gamma=angles() * tree, b=lengths() * tree,
+        antecedent=antecedent, sigma=sigma, alpha=angles[0], theta=angles[1],
+        gamma=angles[2] * tree, d=lengths[0], r=lengths[1], b=lengths[2] * tree,
     )  # fmt: skip
     return rm.RobotModel.from_table(table, gravity=GRAVITIES[rng.integers(4)])
 
@@ -175,20 +166,6 @@ def test_axes_within_1e_5_rad_are_aligned_in_the_regrouping():
     assert apart > 5
 
 
-def test_gravity_and_the_first_axis_are_aligned_in_any_base(rng):
-    """Also where no angle of the table is a right one: a wall, a slope, a fixed frame between."""
-    rows = [{"sigma": 2, "alpha": 0.7, "theta": 0.4}, {"sigma": 0, "alpha": 0.5, "d": 0.2}]
-    arm = of_rows(*rows, {"sigma": 0, "alpha": 0.3, "beta": 0.2, "d": 0.4})
-    first = rm.link_poses(arm, np.zeros(2))[1][:3, :3]
-    for down, across in ((first[:, 2], first[:, 0]), (first[:, 1], first[:, 2])):
-        off = down + 5e-6 * across
-        meant = base_parameters(arm.with_gravity(9.81 * down), drive=True)
-        for base in by_both(arm.with_gravity(9.81 * off / np.linalg.norm(off)), rng):
-            assert base.names == meant.names
-            assert "axis 2 and gravity" in base.notes[0]
-            assert "but for 5.0e-06 rad" in base.notes[0]
-
-
 def test_a_slope_of_prismatic_joints_is_aligned(rng):
     """The third axis is aligned with the first and gravity, and not with the one before it."""
     eighth = np.pi / 4
@@ -210,37 +187,7 @@ def test_torque_errors_are_noted():
     assert words in residual_warning(0.2, 1e-11)[0]
 
 
-# --- what others print ---------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ["rx90", "scara", "two_arm_tree"])
-def test_symoro(name):
-    folder = Path(__file__).parent / "oracles"
-    table = json.loads((folder / f"symoro_{name}.json").read_text(encoding="utf-8"))["table"]
-    oracle = json.loads((folder / "symoro_base_parameters.json").read_text("utf-8"))[name]
-    keys = [{"j": "number", "ant": "antecedent"}.get(k, k) for k in table["columns"]]
-    rows = [dict(zip(keys, [x or 0.0 for x in values], strict=True)) for values in table["rows"]]
-    for row in rows:
-        del row["number"]
-        row["antecedent"], row["sigma"] = int(row["antecedent"]), int(row["sigma"])
-        row["mu"] = int(row["mu"])
-    model = rm.RobotModel.from_table(rm.DHTable.from_rows(rows))
-    for method in ("symbolic", "numeric"):
-        base = base_parameters(model, method)
-        own = {
-            name: {k: v for k, v in parts.items() if not k.startswith("offset")}
-            for name, parts in base.regrouping.items()
-            if not name.startswith(("Fv", "Fc", "offset"))
-        }
-        theirs = {
-            kept.replace("IA", "Ia"): {k.replace("IA", "Ia"): v for k, v in parts.items()}
-            for kept, parts in oracle["grouping"].items()
-        }
-        assert len(own) == oracle["dimension"]
-        assert own.keys() == theirs.keys()
-        for kept, parts in own.items():
-            assert parts == pytest.approx(theirs[kept], abs=1e-9)
-        assert list(base.no_effect) == [n.replace("IA", "Ia") for n in oracle["no_effect"]]
+# --- what the book prints ------------------------------------------------------------------------
 
 
 def test_rx90_prints_as_the_book():
@@ -264,19 +211,15 @@ def test_formulas_have_the_values_of_the_numbers(build):
     for _ in range(6):
         base = base_parameters(build(rng))
         values = {c.text: c.value for c in constants_of(base.model)}
-        for formula, row in zip(base.formulas, base.matrix, strict=True):
-            found = np.zeros_like(row)
+        symbols = {c: sympy.Symbol(c) for c in values}
+        found = np.zeros_like(base.matrix)
+        for formula, row in zip(base.formulas, found, strict=True):
             for term in formula.terms:
                 text = {"": "1", "-": "-1"}.get(term.text, term.text).replace("^", "**")
-                value = float(
-                    sympy.sympify(text, locals={c: sympy.Symbol(c) for c in values}).evalf(
-                        subs=values
-                    )
-                )
+                value = float(sympy.sympify(text, locals=symbols).evalf(subs=values))
                 assert value == pytest.approx(term.coefficient, rel=1e-5, abs=1e-9)
-                for name in term.parameters:
-                    found[base.parameter_names.index(name)] = value
-            assert np.allclose(found, row, rtol=1e-5, atol=1e-9)
+                row[[base.parameter_names.index(name) for name in term.parameters]] = value
+        assert np.allclose(found, base.matrix, rtol=1e-5, atol=1e-9)
 
 
 # --- cases that other programs get wrong ---------------------------------------------------------
@@ -300,15 +243,14 @@ def test_prismatic_and_horizontal_first_axes():
 
 
 def test_counts_of_the_literature_and_coupled_motors():
-    for method in BaseMethod:  # counts of the literature
-        assert len(base_parameters(rm.load("rx90"), method, drive=("Ia",))) == 40
-        assert len(base_parameters(rm.load("erd:ur10"), method)) == 52
-    assert base_parameters(rm.load("tx40")).names[-3:] == ("Iam6", "Fvm6", "Fcm6")
     # the rotors of two parallel axes and the inertia they carry make the coupling term up
     coupled = rm.Transmission([[1.0, 0.0], [-1.0, 1.0]], Iam=[0.0, 0.1])
+    planar = rm.load("planar_2r").with_transmission(coupled)
     for method in BaseMethod:
-        base = base_parameters(rm.load("planar_2r").with_transmission(coupled), method)
-        assert "Iam2" not in base.names
+        assert len(base_parameters(rm.load("rx90"), method, drive=("Ia",))) == 40
+        assert len(base_parameters(rm.load("erd:ur10"), method)) == 52
+        assert "Iam2" not in base_parameters(planar, method).names
+    assert base_parameters(rm.load("tx40")).names[-3:] == ("Iam6", "Fvm6", "Fcm6")
 
 
 def test_gravity_loaded_prismatic_joint_keeps_its_mass_and_rotor():
@@ -336,11 +278,8 @@ def test_a_log_without_a_clear_gap_is_noted():
         assert bool(notes) == (kept < 100 * other)
         if notes:
             doubted += 1
-            assert f"kept with {kept:.1e}" in notes[0]
-            assert f"left out with {other:.1e}" in notes[0]
-            assert "Use a richer motion, or state the zero tolerance= (here 1e-11)" in notes[0]
-            names = notes[0].split("Uncertain: ")[1].split(". Use a richer")[0].split(" and ")[0]
-            assert {*names.split(", ")} <= {*base.parameter_names}
+            for words in (f"kept with {kept:.1e}", f"left out with {other:.1e}", "(here 1e-11)"):
+                assert words in notes[0]
         else:
             moved += kept < 1e-11 or other > 1e-11
             assert kept > 3e-13
@@ -349,32 +288,28 @@ def test_a_log_without_a_clear_gap_is_noted():
             assert any(f"excites {len(base)} of the 58 base parameters" in n for n in base.notes)
     assert doubted
     assert moved
-    still = np.full((20, 6), 0.3), np.zeros((20, 6)), np.zeros((20, 6))
-    base = base_parameters(model, "numeric", motion=still, drive=True)
-    assert "This motion excites 6 of the 58 base parameters; not kept: ZZ1," in base.notes[0]
 
 
 def test_joints_bound_to_each_other(rng):
     model = rm.load("planar_3r")
     G = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    free = base_parameters(model, drive=True)
     base = base_parameters(model, "numeric", constraint=G, drive=True)
-    assert len(base) < len(base_parameters(model, drive=True))
+    assert len(base) < len(free)
     u, du, ddu = rng.normal(size=(3, 30, 2))
     W = np.einsum("ku,nkp->nup", G, torque_regressor(model, u @ G.T, du @ G.T, ddu @ G.T))
     assert np.allclose(base.reduce(W) @ base.matrix, W, atol=1e-9 * abs(W).max())
-    same = base_parameters(model, "numeric", constraint=rm.Transmission(np.eye(3)), drive=True)
-    assert same.names == base_parameters(model, drive=True).names
     mimic = rm.Transmission([[1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0]])
-    again = base_parameters(model, "numeric", constraint=mimic, drive=True)
-    assert again.names == base.names
+    for constraint, names in ((rm.Transmission(np.eye(3)), free.names), (mimic, base.names)):
+        again = base_parameters(model, "numeric", constraint=constraint, drive=True)
+        assert again.names == names
     assert "constrained: rank 2 of 3" in base.text
     mistake = base_parameters(rm.load("rx90"), "numeric", constraint=np.ones((6, 6)))
-    assert "rank 1 of 6, torques of 1 free variables." in mistake.text
     assert "6 columns of the constraint depend on each other" in mistake.notes[0]
     assert "is singular, rank 2 of 3" in base_parameters(model.with_transmission(mimic)).text
 
 
-@pytest.mark.parametrize("name", ["rx90", "cobra_s600", "gantry", "erd:so101"])
+@pytest.mark.parametrize("name", ["rx90", "cobra_s600", "gantry"])
 def test_friction_models_are_columns_of_both_methods(name, rng):
     model = filled(rm.load(name), rng)
     n = model.n
@@ -382,16 +317,10 @@ def test_friction_models_are_columns_of_both_methods(name, rng):
     asymmetric = AsymmetricFriction(Fv, Fc, Fs, positive)
     stribeck = StribeckFriction(Fv, Fc, 2 + Fs, np.full(n, 1e-3))
     # of four asymmetric columns three are Fv, Fc and offset again
-    for friction, drive, more in (
-        (asymmetric, True, 1), (asymmetric, False, 4), (stribeck, False, 3),
-    ):  # fmt: skip
+    cases = ((asymmetric, True, 1), (asymmetric, False, 4), (stribeck, False, 3))
+    for friction, drive, more in cases:
         rules, _ = by_both(model, rng, drive=drive, friction=friction)
         assert len(rules) == len(base_parameters(model, drive=drive)) + more * n
-    q, v, a = rng.uniform(-2, 2, (3, 40, n))
-    torque = rm.idm(model, q, v, a, drive=False, friction=stribeck)
-    W = torque_regressor(model, q, v, a, drive=False, friction=stribeck)
-    off = abs(rules.reduce(W) @ rules.values(model) - torque).max()
-    assert off <= (1e-10 + 3 * turned(rules)) * abs(torque).max()
     with pytest.raises(InvalidValueError, match=r"Fv columns already.*drive=\('Ia', 'offset'\)"):
         base_parameters(model, friction=stribeck, drive=True)
 
@@ -402,35 +331,26 @@ def test_notes_name_the_tolerance_to_use():
     assert "tolerance=1e-08 would align them" in exact.notes[0]
     meant = base_parameters(model, tolerance=1e-8, drive=True)
     assert len(meant) == 58 < len(exact)
-    assert "Treated as aligned" in meant.text
     # what a great tolerance leaves out has an effect, and is not listed without one
     assert meant.neglected == ("MX1", "MY1", "MZ2")
     assert "Neglected, about 1e-08 of the largest torque or less: MX1, MY1, MZ2" in meant.text
-    assert r"MX_{1}" in meant.latex.split("Neglected")[1]
     assert not {*meant.neglected} & {*meant.no_effect, *meant.alone, *meant.in_combination}
-    for base in (base_parameters(model, "numeric", tolerance=1e-8, drive=True),
-                 base_parameters(model, drive=True)):  # fmt: skip
-        assert (base.names, base.neglected) == (meant.names, meant.neglected)
 
 
 def test_values_have_names_and_units(rng):
     model = filled(rm.load("cobra_s600"), rng)
     base = base_parameters(model)
     table = base.value_table(model)
-    assert list(table) == list(base.names)
     assert list(table.values()) == base.values(model).tolist()
-    assert table["ZZ1R"] == table["ZZ1"]
     rows = [line.strip("│").split("│") for line in str(table).splitlines() if line[0] == "│"]
     cells = {row[0].strip(): (row[1].strip(), row[2].strip()) for row in rows[1:]}
-    assert cells["ZZ1R"] == (f"{table['ZZ1']:.6g}", "kg m^2")
+    assert cells["ZZ1R"] == (f"{table['ZZ1R']:.6g}", "kg m^2")
     assert [cells[k][1] for k in ("Fv1", "Fv3", "Fc1", "Fc3")] == ["N m s/rad", "N s/m", "N m", "N"]
-    assert cells["M3R"][1] == "kg"
     text = " ".join(str(base).split())
     assert "; Ia kg m^2, Fv N m s/rad, Fc and offset N m;" in text
     assert "; of prismatic joints Ia kg, Fv N s/m, Fc and offset N" in text
     again = pickle.loads(pickle.dumps(base.value_table(base.values(model))))
     assert dict(again) == dict(table)
-    assert not again.numbers.flags.writeable
     with pytest.raises(ShapeError, match="values"):
         base.value_table([1.0, 2.0])
     with pytest.raises(KeyError, match=r"No base parameter 'ZZZ1'.* mean ZZ1"):
@@ -448,30 +368,25 @@ def test_null_space_has_no_torque(rng):
     assert abs(base.matrix @ base.null_space).max() < 1e-14
     names = {*base.no_effect, *base.alone, *base.in_combination}
     assert names == set(parameter_names(base.model))
-    assert "XY4" in base.alone
-    assert {"YY5", "ZZ4"} <= set(base.in_combination)
 
 
 def test_values_belong_to_the_robot(rng):
-    arm = rm.load("rx90")
-    base = base_parameters(arm)
-    with pytest.raises(InvalidValueError, match=r"'puma560' has others: axis 3 has another"):
-        base.values(rm.load("puma560"))
-    with pytest.raises(InvalidValueError, match="frames or kinds of joints differ"):
-        base.values(rm.load("planar_2r"))
-    with pytest.raises(InvalidValueError, match="gravity in the base is"):
-        base.values(arm.with_gravity([0.0, 0.0, 0.0]))
+    arm, wrist = rm.load("rx90"), rm.load("tx40")
+    base, coupled = base_parameters(arm), base_parameters(wrist)
+    for one, other, words in (
+        (base, rm.load("puma560"), "'puma560' has others: axis 3 has another"),
+        (base, rm.load("planar_2r"), "frames or kinds of joints differ"),
+        (base, arm.with_gravity([0.0, 0.0, 0.0]), "gravity in the base is"),
+        (coupled, wrist.with_transmission(None), "other motors are coupled"),
+    ):
+        with pytest.raises(InvalidValueError, match=words):
+            one.values(other)
+        assert not one.belongs_to(other)
     with pytest.raises(ShapeError, match="a column for each"):
         base.reduce(np.ones((4, 60)))
     # bodies, drives and tool are values of its own, and no other robot
-    for other in (filled(arm, rng), arm.with_tool(random_pose(rng))):
-        assert base.belongs_to(other)
-        base.check(other)
-    assert not base.belongs_to(rm.load("ur5"))
-    wrist = rm.load("tx40")
+    assert base.belongs_to(filled(arm, rng).with_tool(random_pose(rng)))
     assert base_parameters(wrist, drive=False).belongs_to(wrist.with_transmission(None))
-    with pytest.raises(InvalidValueError, match="other motors are coupled"):
-        base_parameters(wrist).check(wrist.with_transmission(None))
 
 
 def test_mistakes_are_named():

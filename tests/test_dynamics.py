@@ -5,41 +5,35 @@ import pytest
 from identities.random_robots import random_model, random_state
 
 import robotmodels as rm
+from robotmodels.dynamics import base_model, idm_from_base, with_payload, without_payload
 from robotmodels.errors import (
     InertiaError,
     InvalidValueError,
     ShapeError,
     SingularMassMatrixError,
 )
+from robotmodels.friction import AsymmetricFriction
 from robotmodels.inertia import InertiaWarning
+from robotmodels.minimal_parameters import base_parameters
 from robotmodels.regressors import (
-    energy_parameter_names,
     momentum_regressor,
     power_regressor,
 )
 
-# name: function of the model and its vectors, lengths of these, shape of the result
+# function of the model and its vectors, lengths of these
 FUNCTIONS = {
-    "idm": (rm.idm, "nnn", ("n",)),
-    "idm with a wrench": (rm.idm, "nnn6", ("n",)),
-    "ddm": (rm.ddm, "nnn", ("n",)),
-    "ddm with a wrench": (rm.ddm, "nnn6", ("n",)),
-    "mass_matrix": (rm.mass_matrix, "n", ("n", "n")),
-    "coriolis_matrix": (rm.coriolis_matrix, "nn", ("n", "n")),
-    "gravity_torque": (rm.gravity_torque, "n", ("n",)),
-    "kinetic_energy": (rm.kinetic_energy, "nn", ()),
-    "potential_energy": (rm.potential_energy, "n", ()),
-    "torque_regressor": (rm.torque_regressor, "nnn", ("n", "p")),
-    "power_regressor": (power_regressor, "nnn", ("p",)),
-    "momentum": (lambda m, *x: momentum_regressor(m, *x).momentum, "nn", ("n", "p")),
-    "force": (lambda m, *x: momentum_regressor(m, *x).force, "nn", ("n", "p")),
-    "energy_regressor": (rm.energy_regressor, "nn", ("e",)),
+    "idm": (rm.idm, "nnn6"),
+    "ddm": (rm.ddm, "nnn6"),
+    "mass_matrix": (rm.mass_matrix, "n"),
+    "coriolis_matrix": (rm.coriolis_matrix, "nn"),
+    "gravity_torque": (rm.gravity_torque, "n"),
+    "kinetic_energy": (rm.kinetic_energy, "nn"),
+    "potential_energy": (rm.potential_energy, "n"),
+    "torque_regressor": (rm.torque_regressor, "nnn"),
+    "power_regressor": (power_regressor, "nnn"),
+    "momentum_regressor": (lambda m, *x: momentum_regressor(m, *x).force, "nn"),
+    "energy_regressor": (rm.energy_regressor, "nn"),
 }
-
-
-@pytest.fixture(params=FUNCTIONS)
-def case(request):
-    return FUNCTIONS[request.param]
 
 
 @pytest.fixture(scope="module", params=["physical", "any"])
@@ -63,11 +57,6 @@ def model(request):
     return model
 
 
-def shape_of(core, model):
-    sizes = {"n": model.n, "p": len(rm.parameter_names(model))}
-    return tuple((sizes | {"e": len(energy_parameter_names(model))})[k] for k in core)
-
-
 def vectors_of(lengths, model, *batch):
     rng = np.random.default_rng(5)
     q, v, a = random_state(model, rng, *batch)
@@ -81,36 +70,22 @@ def close(actual, expected, tolerance=1e-12):
     np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance * scale)
 
 
-def test_batches_broadcast(case, model):
-    """One argument of three rows among single ones, each in turn; others do not fit."""
-    function, lengths, _ = case
+@pytest.mark.parametrize(("function", "lengths"), FUNCTIONS.values(), ids=FUNCTIONS)
+def test_batches_broadcast(function, lengths, model):
+    """One argument of three rows among single ones, each in turn; others are named."""
     vectors = vectors_of(lengths, model, 3)
-    for k in range(len(lengths)):
+    names = (*("q", "v", "tau" if function is rm.ddm else "a"), "wrench")
+    for k, name in zip(range(len(lengths)), names, strict=False):
         mixed = [x.tolist() if i == k else x[0] for i, x in enumerate(vectors)]
         full = [x if i == k else np.tile(x[0], (3, 1)) for i, x in enumerate(vectors)]
         close(function(model, *mixed), function(model, *full))
         if len(lengths) > 1:
             with pytest.raises(ShapeError, match="do not broadcast"):
                 function(model, *(x[:2] if i == k else x for i, x in enumerate(vectors)))
-
-
-@pytest.mark.parametrize(
-    ("build", "error", "words"),
-    [
-        (lambda k: np.zeros(k + 1), ShapeError, "expected shape"),
-        (lambda k: np.zeros((k, 1)), ShapeError, "ravel"),
-        (lambda k: np.full((3, k), np.inf), InvalidValueError, "inf"),
-        (lambda k: ["0"] * k, InvalidValueError, "real numbers"),
-    ],
-)
-def test_a_bad_vector_is_named(case, model, build, error, words):
-    function, lengths, _ = case
-    names = (*("q", "v", "tau" if function is rm.ddm else "a"), "wrench")
-    for position, length in enumerate(lengths):
-        vectors = vectors_of(lengths, model)
-        vectors[position] = build(6 if length == "6" else model.n)
-        with pytest.raises(error, match=f"^{names[position]}: .*{words}"):
-            function(model, *vectors)
+        for bad, error in ((mixed[k][0][1:], ShapeError), (np.inf * full[k], InvalidValueError)):
+            mixed[k] = bad
+            with pytest.raises(error, match=f"^{name}: "):
+                function(model, *mixed)
 
 
 # --- singular mass matrices ------------------------------------------------------------------
@@ -226,4 +201,60 @@ def test_first_moments_over_hardly_any_mass_lose_no_digits(mass):
     close(rm.idm(arm, q, v, a), rm.torque_regressor(arm, q, v, a) @ parameters, 1e-13)
 
 
-# --- few joints ------------------------------------------------------------------------------
+# --- payloads and base parameters ---------------------------------------------------------------
+
+
+def planar():
+    links = rm.InertialParameters.from_com([1, 2], [[0.2, 0, 0], [0.1, 0, 0]], np.zeros((2, 3, 3)))
+    return rm.RobotModel.from_table(rm.DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.5]), links)
+
+
+def test_what_is_taken_off_leaves_nothing_behind():
+    bare = planar().with_inertia(None)
+    payload = 0.7, [0.1, 0.3, -0.2], np.diag([0.3, 0.2, 0.11])
+    loaded = with_payload(bare, *payload)
+    np.testing.assert_array_equal(without_payload(loaded, *payload).inertia.values, 0.0)
+    assert with_payload(bare, 0.0, [1.0, 0.0, 0.0]).inertia == bare.inertia
+    # point masses are on the border of what bodies have: rounding gives no warning
+    for mass in (1e-9, 1e6):
+        for com in np.random.default_rng(0).normal(size=(10, 3)):
+            left = without_payload(with_payload(planar(), mass, com), mass, com).inertia.values
+            atol = 1e-14 * max(1.0, mass)
+            np.testing.assert_allclose(left, planar().inertia.values, atol=atol)
+
+
+@pytest.mark.parametrize(
+    ("payload", "words"),
+    [
+        ((5.0, [0, 0, 0]), "link 2 .*'robot'.*negative mass -3 kg"),
+        ((2.0, [0.3, 0, 0]), "first moments without mass"),
+        ((1.0, [0.1, 0.0, 0], 0.2 * np.eye(3), 1), "link 1 "),
+    ],
+)
+def test_a_body_that_was_not_there_is_reported(payload, words):
+    """The link is warned of by name; the numbers are those of the subtraction."""
+    with pytest.warns(InertiaWarning, match=words) as caught:
+        left = without_payload(planar(), *payload)
+    assert caught[0].filename == __file__
+    assert not left.inertia.is_physical.all()
+    # a link that was no body before is not the payload's fault
+    identified = planar().with_inertia(rm.InertialParameters(-np.ones((2, 10))))
+    without_payload(identified, *payload)
+
+
+@pytest.mark.parametrize("drive", [True, False])
+def test_base_parameters_with_a_friction_model(drive):
+    model = random_model(np.random.default_rng(8), f=4, drive=True)
+    n = model.n
+    rng = np.random.default_rng(1)
+    friction = AsymmetricFriction(*rng.uniform(0.5, 2.0, (4, n)))
+    if drive:
+        model = model.with_drive(rm.DriveParameters(Ia=model.drive.Ia))
+    q, v, a = random_state(model, rng, 20)
+    base = base_parameters(model, "numeric", drive=drive, friction=friction)
+    values = base.values(model)
+    tau = rm.idm(model, q, v, a, friction=friction)
+    found = idm_from_base(model, base, values, q, v, a)
+    np.testing.assert_allclose(found, tau, rtol=0, atol=1e-10 * np.abs(tau).max())
+    with pytest.raises(InvalidValueError, match="AsymmetricFriction"):
+        base_model(model, base, values)

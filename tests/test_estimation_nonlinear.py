@@ -65,22 +65,6 @@ def test_millimetres_and_metres_give_the_same_answer(loss, share):
     assert a.outliers.tolist() == b.outliers.tolist()
 
 
-def test_estimate_agrees_with_scipy():
-    from scipy.optimize import least_squares
-
-    arm = Arm(1, noise=1e-3)
-    fit = arm.fit(sigma=1e-3)
-    peer = least_squares(
-        lambda x: arm(x)[0], np.zeros(10), lambda x: arm(x)[1], xtol=1e-15, ftol=1e-15, gtol=1e-15
-    )
-    assert np.abs(fit.x - peer.x).max() < 1e-10
-    expected = np.linalg.inv(peer.jac.T @ peer.jac) * 2 * peer.cost / 590
-    assert np.allclose(fit.covariance, expected, rtol=1e-6, atol=1e-16)
-    # the estimate is where the slope of the sum is rounding
-    r, J = arm(fit.x)
-    assert np.abs(J.T @ r).max() < 1e-12 * np.linalg.norm(r) * np.linalg.norm(J)
-
-
 @pytest.mark.parametrize("loss", [Loss.HUBER, Loss.CAUCHY, Loss.TUKEY])
 @pytest.mark.parametrize("seed", range(2))
 def test_outliers_do_not_move_a_robust_fit_by_its_deviation(loss, seed):
@@ -250,25 +234,21 @@ def test_mistakes_are_named():
     def mean(x):
         return x - np.arange(4.0), np.ones((4, 1))
 
-    for linearise, x0, error, words in (
-        (mean, [], ShapeError, "P at least 1"),
-        (lambda x: (x - np.ones(4), np.ones((3, 1))), [0.0], ShapeError, r"a Jacobian \(4, 1\)"),
-        (lambda x: (x + 1e200, np.eye(1)), [0.0], InvalidValueError, "overflow at x0"),
-    ):
-        with pytest.raises(error, match=words):
-            fit_nonlinear(linearise, x0)
-    for options, error, words in (
-        ({"sigma": -1.0}, InvalidValueError, "positive"),
-        ({"block": [0.0, 1.0, 2.0, 3.0]}, ShapeError, "4 whole numbers, got 1 and float64"),
-        ({"loss": "cubes"}, InvalidValueError, "tukey"),
-        ({"prior": Prior.none(3)}, ShapeError, "a prior of 1 parameters"),
-        ({"truncation": 2.0}, InvalidValueError, "truncation"),
-        ({"iterations": 0}, InvalidValueError, "iterations"),
-    ):
-        with pytest.raises(error, match=words):
-            fit_nonlinear(mean, [0.0], **options)
     fewer = iter((mean, lambda x: (np.zeros(3), np.ones((3, 1)))))
-    with pytest.raises(ShapeError, match=r"residuals \(4,\) and a Jacobian \(4, 1\), got \(3,\)"):
-        fit_nonlinear(lambda x: next(fewer)(x), [0.0])
+    for linearise, x0, options, error, words in (
+        (mean, [], {}, ShapeError, "P at least 1"),
+        (lambda x: (x - np.ones(4), np.ones((3, 1))), [0.0], {}, ShapeError, r"Jacobian \(4, 1\)"),
+        (lambda x: (x + 1e200, np.eye(1)), [0.0], {}, InvalidValueError, "overflow at x0"),
+        (lambda x: next(fewer)(x), [0.0], {}, ShapeError,
+         r"residuals \(4,\) and a Jacobian \(4, 1\), got \(3,\)"),
+        (mean, [0.0], {"sigma": -1.0}, InvalidValueError, "positive"),
+        (mean, [0.0], {"block": [0.0, 1.0, 2.0, 3.0]}, ShapeError, "4 whole numbers, got 1 and fl"),
+        (mean, [0.0], {"loss": "cubes"}, InvalidValueError, "tukey"),
+        (mean, [0.0], {"prior": Prior.none(3)}, ShapeError, "a prior of 1 parameters"),
+        (mean, [0.0], {"truncation": 2.0}, InvalidValueError, "truncation"),
+        (mean, [0.0], {"iterations": 0}, InvalidValueError, "iterations"),
+    ):  # fmt: skip
+        with pytest.raises(error, match=words):
+            fit_nonlinear(linearise, x0, **options)
     with pytest.raises(InvalidValueError, match="standard deviations"):
         Prior([0.0], [0.0])

@@ -142,9 +142,6 @@ def test_with_methods_change_one_thing_in_a_new_model(change, rng):
     assert np.array_equal(numbers(changed, q, v, a), numbers(fresh, q, v, a)), "no stale cache"
 
 
-# --- the same numbers in threads and processes ---------------------------------------------------
-
-
 # --- Pinocchio's side ----------------------------------------------------------------------------
 
 
@@ -194,7 +191,6 @@ CALLS = {
     "dgm": lambda m, x: rm.dgm(m, x),
     "link_poses": lambda m, x: rm.link_poses(m, x),
     "jacobian_rate": lambda m, x: rm.jacobian_rate(m, np.zeros(6), x),
-    "dkm": lambda m, x: rm.dkm(m, np.zeros(6), x),
 }
 
 

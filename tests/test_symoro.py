@@ -3,6 +3,7 @@
 import json
 import math
 import pickle
+import re
 import warnings
 from pathlib import Path
 
@@ -66,19 +67,10 @@ def open_symoro(robot, counts=None, kind=0, extra=""):
 
 def symoro_plus(robot, extra=""):
     """As SYMORO+ writes one: capitals, Pi, lists that begin on the next line, an accent."""
-    n = len(robot["ant"])
-    capitals = {"gamma": "gamma", "d": "d"}
-    lines = ["(*****************)", "(*    SYMORO+    *)", "(* rue de la Noë *)", ""]
-    lines += ["(* General parameters *)", f"(* Robotname = '{robot['name']}' *)"]
-    lines += [f"NF = {n}", f"NL = {n}", f"NJ = {n}", "Type = 0 (* Simple *)", ""]
-    for key in COLUMNS:
-        entries = [str(entry).replace("pi", "Pi") for entry in robot[key]]
-        broken = [",".join(entries[:2]) + ",", ",".join(entries[2:])] if n > 2 else [
-            ",".join(entries)
-        ]  # fmt: skip
-        body = "\n        ".join(broken)
-        lines += [f"{capitals.get(key, key.capitalize())} = {{\n        {body}}}"]
-    return "\n".join([*lines, extra, "(* End of definition *)", ""])
+    text = open_symoro(robot, extra=extra).replace("pi", "Pi").replace("is_mobile = 0", "")
+    text = text.replace("is_floating = False", "(* rue de la Noë *)")
+    lists = re.compile(r"^(ant|sigma|b|r|alpha|mu|theta) = \{(.*?,)(.*)\}$", re.M)
+    return lists.sub(lambda m: f"{m[1].capitalize()} = {{\n  {m[2]}\n  {m[3]}}}", text)
 
 
 def dynamic_lists(links):
@@ -86,12 +78,10 @@ def dynamic_lists(links):
 
 
 def symbolic_lists(n):
-    keys = (*LINK_KEYS, *WRENCH_KEYS)
+    keys = (*LINK_KEYS, *WRENCH_KEYS, "QP", "QDP")
     lines = [f"{key} = {listed([f'{key}{j}' for j in range(1, n + 1)])}" for key in keys]
-    lines += [f"{key} = {listed([f'{key}{j}' for j in range(1, n + 1)])}" for key in ("QP", "QDP")]
     lines += [f"{key} = {{0,0,0}}" for key in ("W0", "WP0", "V0", "VP0")]
-    lines += ["G = {0,0,G3}", "Z = {1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1}"]
-    return "\n".join(lines)
+    return "\n".join([*lines, "G = {0,0,G3}", "Z = {1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1}"])
 
 
 @pytest.fixture

@@ -176,13 +176,8 @@ def test_merged_links_are_listed_and_stay_frames():
     model = read(text)
     assert model.table.names == ("j1", "j3")
     assert model.merged_links == ("c", "e")
-    assert model.notes == (
-        "link 'c' (fixed by joint 'j2') is merged into the link of j1.",
-        "link 'e' (fixed by joint 'j4') is merged into the link of j3.",
-    )
+    assert model.notes[0] == "link 'c' (fixed by joint 'j2') is merged into the link of j1."
     assert set("abcde") <= set(model.frame_names)
-    assert model.pin_model.existFrame("c")
-    assert_like_pinocchio(text, model, dynamics=False)
 
 
 # --- base and tip -------------------------------------------------------------------------------
@@ -211,15 +206,6 @@ def test_base_and_tip_choose_a_chain_and_lock_the_rest():
     q = [0.3, -0.4]
     assert np.array_equal(rm.dgm(model, q), rm.dgm(model, q, "tcp"))
     assert np.allclose(rm.dgm(model, q, "base"), np.eye(4), atol=1e-15)
-
-
-def test_links_that_are_not_there():
-    with pytest.raises(FrameNotFoundError, match=r"No link 'fingr'\. Did you mean 'finger'"):
-        read(BRANCHED, tip_link="fingr")
-    with pytest.raises(FrameNotFoundError, match="below the base link 'head'"):
-        read(BRANCHED, base_link="head", tip_link="tcp")
-    with pytest.raises(UrdfError, match="no joint moves between"):
-        read(BRANCHED, base_link="hand", tip_link="tcp")
 
 
 @pytest.mark.parametrize("kind", ["floating", "planar"])
@@ -260,19 +246,6 @@ def test_mimics_follow_through_chains():
     assert any("joint 'j2' mimics 'j1' and moves by itself here" in note for note in alone.notes)
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        (chain(mimic("j2"), mimic("j1")), "j1, j2 mimic each other in a circle"),
-        (chain({}, {"kind": "fixed"}, mimic("j2")), "mimics 'j2', which is not a moving joint"),
-    ],
-)
-def test_mimics_that_make_no_sense(text, words):
-    with pytest.raises(UrdfError, match=words):
-        read(text, mimic=True)
-    assert read(text).transmission is None, "they do not matter when joints are independent"
-
-
 # --- meshes -------------------------------------------------------------------------------------
 
 
@@ -283,52 +256,45 @@ def meshed(filename):
 
 @pytest.fixture
 def package(tmp_path):
-    """A package ``arm_description`` with one mesh and a URDF that names it in three ways."""
+    """A package ``arm_description`` with one mesh, beside a file that is none of its business."""
     folder = tmp_path / "share" / "arm_description"
     (folder / "meshes").mkdir(parents=True)
-    (folder / "meshes" / "base link.stl").write_text("solid\n")
     (folder / "urdf").mkdir()
-    (folder / "package.xml").write_text("<package/>\n")
+    for place in ("meshes/base link.stl", "package.xml", "../secret.stl"):
+        (folder / place).write_text("<package/>\n")
     return folder
 
 
+def drawn(source, **options):
+    return read(source, **options).visuals[0].shape.path
+
+
 @pytest.mark.parametrize("scheme", ["package", "model"])
-@pytest.mark.parametrize("dirs", ["share", "(other, share)", "itself"])
-def test_packages_are_found_in_their_folders_and_from_the_file(package, scheme, dirs):
+def test_meshes_are_found_in_their_package_and_from_the_file_and_nowhere_else(package, scheme):
     share, mesh = package.parent, package / "meshes" / "base link.stl"
-    filename = f"{scheme}://arm_description/meshes/base%20link.stl"
-    package_dirs = {"share": str(share), "(other, share)": (share / "other", share),
-                    "itself": package}[dirs]  # fmt: skip
-    shape = read(meshed(filename), package_dirs=package_dirs).visuals[0].shape
-    assert (shape.path, shape.filename) == (mesh, filename)
-    path = package / "urdf" / "arm.urdf"
-    for name in (filename, "../meshes/base link.stl", f"file://{mesh}"):
+    secret, path = share / "secret.stl", package / "urdf" / "arm.urdf"
+    (package / "urdf" / "link.stl").symlink_to(secret)
+    inside = f"{scheme}://arm_description/meshes/base%20link.stl"
+    for package_dirs in (str(share), (share / "other", share), package):
+        assert drawn(meshed(inside), package_dirs=package_dirs) == mesh
+    for name in (inside, "../meshes/base link.stl", f"file://{mesh}"):
         path.write_text(meshed(name))
-        assert read(path).visuals[0].shape.path.samefile(mesh)
-
-
-def test_meshes_outside_of_the_urdf_and_its_package_need_permission(package):
-    secret = package.parent / "secret.stl"
-    secret.write_text("solid\n")
-    path = package / "urdf" / "arm.urdf"
-    link = package / "urdf" / "link.stl"
-    link.symlink_to(secret)
+        assert drawn(path).samefile(mesh)
     names = ["../../secret.stl", str(secret), f"file://{secret}", "link.stl"]
-    names += ["package://arm_description/../secret.stl", "package:///../secret.stl"]
-    for name in names:
+    for name in (*names, "package://arm_description/../secret.stl", "package:///../secret.stl"):
         path.write_text(meshed(name))
-        assert read(path).visuals[0].shape.path is None, name
+        assert drawn(path) is None, name
     path.write_text(meshed("../../secret.stl"))
-    assert read(path, package_dirs=package.parent).visuals[0].shape.path.samefile(secret)
+    assert drawn(path, package_dirs=share).samefile(secret)
     (package / "package.xml").unlink()
     path.write_text(meshed("../meshes/base link.stl"))
-    assert read(path).visuals[0].shape.path is None
+    assert drawn(path) is None
 
 
 def test_missing_meshes(package):
     """An error if folders were given, unresolved until somebody draws it otherwise."""
     text = meshed("package://arm_description/meshes/nope.stl")
-    assert read(text).visuals[0].shape.path is None
+    assert drawn(text) is None
     with pytest.raises(MeshNotFoundError, match=r"nope\.stl' was not found \(looked at .*share"):
         read(text, package_dirs=package.parent)
 
@@ -377,20 +343,6 @@ def test_doctypes_are_refused_at_once(doctype):
     assert time.process_time() - start < 0.1
 
 
-@pytest.mark.parametrize(
-    ("source", "words"),
-    [
-        (b"<robot/>", "expected a path or the text of a URDF, got bytes"),
-        ("", "got an empty text"),
-        ("nowhere/arm.urdf", "cannot read 'nowhere/arm.urdf': No such file"),
-        (Path("/"), "cannot read '/'"),
-    ],
-)
-def test_sources_that_are_neither_file_nor_text(source, words):
-    with pytest.raises(UrdfError, match=words):
-        read(source)
-
-
 # --- content that makes no sense ------------------------------------------------------------------
 
 
@@ -404,6 +356,10 @@ def visual(inside):
 
 
 MISTAKES = {
+    "bytes": (b"<robot/>", "expected a path or the text of a URDF, got bytes"),
+    "nothing": ("", "got an empty text"),
+    "no file": ("nowhere/arm.urdf", "cannot read 'nowhere/arm.urdf': No such file"),
+    "a folder": (Path("/"), "cannot read '/'"),
     "open tag": ("<robot name='r'><link name='a'>", "not well-formed XML.*no element found"),
     "no links": ("<robot name='r'/>", "has no <link>"),
     "nothing moves": (robot(link("a")), "no joint moves"),
@@ -439,13 +395,27 @@ MISTAKES = {
     "no mass": (GOOD.replace("</link>", "<inertial/></link>", 1), "<mass"),
     "odd shape": (visual("<geometry><torus/></geometry>"), "unknown shape <torus>"),
     "mesh": (visual("<geometry><mesh/></geometry>"), "a mesh has no filename"),
+    "tip": (BRANCHED, r"No link 'fingr'\. Did you mean 'finger'", {"tip_link": "fingr"}),
+    "tip above": (
+        BRANCHED, "below the base link 'head'", {"base_link": "head", "tip_link": "tcp"},
+    ),
+    "no chain": (
+        BRANCHED, "no joint moves between", {"base_link": "hand", "tip_link": "tcp"},
+    ),
+    "mimic circle": (
+        chain(mimic("j2"), mimic("j1")), "j1, j2 mimic each other in a circle", {"mimic": True},
+    ),
+    "mimic fixed": (
+        chain({}, {"kind": "fixed"}, mimic("j2")), "'j2', which is not a moving", {"mimic": True},
+    ),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("text", "words"), MISTAKES.values(), ids=MISTAKES)
-def test_mistakes_are_refused_with_the_element_at_fault(text, words):
-    with pytest.raises(UrdfError, match=words):
-        read(text)
+@pytest.mark.parametrize("name", MISTAKES)
+def test_mistakes_are_refused_with_the_element_at_fault(name):
+    source, words, *options = MISTAKES[name]
+    with pytest.raises((UrdfError, FrameNotFoundError), match=words):
+        read(source, **(options[0] if options else {}))
 
 
 def test_shapes_and_colours_are_kept():
@@ -469,9 +439,6 @@ def test_shapes_and_colours_are_kept():
     back = read(rm.to_urdf(read(text))).visuals
     assert [v.shape for v in back] == [box.shape, cylinder.shape, ball.shape]
     assert [v.color for v in back] == [box.color, cylinder.color, ball.color]
-
-
-# --- size ---------------------------------------------------------------------------------------
 
 
 # --- real robots, there and back ------------------------------------------------------------------

@@ -54,15 +54,6 @@ def base_model(model: RobotModel, base: Base, values: ArrayLike) -> RobotModel:
     Shapes: values (b,). `idm`, `ddm`, `mass_matrix` and the others, with drives included, are
     those of the robot. Its links are not physical (first moments without mass) and partly contain
     the rotors, so that single links and ``drive=False`` have no meaning.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters import base_parameters
-    >>> arm = load("puma560")
-    >>> base = base_parameters(arm)
-    >>> base_model(arm, base, base.values(arm)).inertia.mass
-    array([0., 0., 0., 0., 0., 0.])
     """
     robot, friction = _split(model, base, values)
     if friction is not None:
@@ -89,12 +80,10 @@ def idm_from_base(
 
     Examples
     --------
-    >>> from robotmodels.robots import load
     >>> from robotmodels.minimal_parameters import base_parameters
-    >>> from robotmodels.dynamics import idm
-    >>> arm = load("puma560")
+    >>> from robotmodels.robots import load
+    >>> arm, motion = load("puma560"), np.ones((3, 6))
     >>> base = base_parameters(arm)
-    >>> motion = np.ones((3, 6))
     >>> tau = idm_from_base(arm, base, base.values(arm), *motion)
     >>> bool(np.allclose(tau, idm(arm, *motion), rtol=1e-12))
     True

@@ -24,6 +24,17 @@ References
 Book sections 1.5.1.1 to 1.5.1.3 and 1.5.1.5; S. Echeandia and P. M. Wensing, "Numerical
 methods to compute the Coriolis matrix and Christoffel symbols for rigid-body systems", ASME JCND
 16(9), 2021.
+
+Examples
+--------
+>>> from robotmodels.geometry import DHTable
+>>> from robotmodels.inertia import InertialParameters
+>>> link = InertialParameters.from_com([2.0], [[0.1, 0, 0]], [np.zeros((3, 3))])
+>>> lift = RobotModel.from_table(DHTable(antecedent=[0], sigma=[1]), link)
+>>> mass_matrix(lift, [0.5]), gravity_torque(lift, [0.5])
+(array([[2.]]), array([19.62]))
+>>> float(kinetic_energy(lift, [0.5], [2.0])), round(float(potential_energy(lift, [0.5])), 12)
+(4.0, 9.81)
 """
 
 from __future__ import annotations
@@ -44,14 +55,6 @@ def mass_matrix(model: RobotModel, q: ArrayLike, drive: bool = True) -> Array:
     """Joint-space inertia matrix M(q), also called A(q) or generalised inertia.
 
     Shapes: q (..., n) -> (..., n, n), symmetric, kg m^2 (kg m, kg for prismatic joints).
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> from robotmodels.inertia import InertialParameters
-    >>> link = InertialParameters.from_com([2.0], [[0.1, 0, 0]], [np.zeros((3, 3))])
-    >>> mass_matrix(RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]), link), [0.0])
-    array([[0.02]])
     """
     check_model(model)
     check_all_or_none(drive)
@@ -75,13 +78,6 @@ def coriolis_matrix(model: RobotModel, q: ArrayLike, v: ArrayLike) -> Array:
     """Matrix C(q, v) of Christoffel symbols; ``dM/dt - 2 C`` is skew-symmetric.
 
     Shapes: q, v (..., n) -> (..., n, n). ``C v`` are the Coriolis and centrifugal torques.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
-    >>> coriolis_matrix(arm, [0.0, 0.0], [1.0, 1.0]).shape
-    (2, 2)
     """
     check_model(model)
     q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
@@ -129,12 +125,6 @@ def gravity_torque(model: RobotModel, q: ArrayLike) -> Array:
     """Gravity torques Q(q), also ``gravload``.
 
     Shapes: q (..., n) -> (..., n), N m or N.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> gravity_torque(load("puma560"), [0.0] * 6).round(2)
-    array([ 0.  , 37.48,  0.25,  0.  ,  0.  ,  0.  ])
     """
     check_model(model)
     q = as_vector(q, model.n, "q")
@@ -152,15 +142,6 @@ def kinetic_energy(model: RobotModel, q: ArrayLike, v: ArrayLike, drive: bool = 
     """Kinetic energy ``v^T M v / 2``.
 
     Shapes: q, v (..., n) -> (...), joules.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> from robotmodels.drive import DriveParameters
-    >>> drive = DriveParameters(Ia=[0.5])
-    >>> one = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]), drive=drive)
-    >>> float(kinetic_energy(one, [0.0], [2.0]))
-    1.0
     """
     check_model(model)
     check_all_or_none(drive)
@@ -181,15 +162,6 @@ def potential_energy(model: RobotModel, q: ArrayLike) -> Array:
     """Potential energy in the gravity field, zero for masses at the world's origin.
 
     Shapes: q (..., n) -> (...), joules.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> from robotmodels.inertia import InertialParameters
-    >>> slide = InertialParameters.from_com([2.0], [[0, 0, 0]], [np.zeros((3, 3))])
-    >>> lift = RobotModel.from_table(DHTable(antecedent=[0], sigma=[1]), slide)
-    >>> round(float(potential_energy(lift, [0.5])), 12)
-    9.81
     """
     check_model(model)
     q = as_vector(q, model.n, "q")

@@ -29,7 +29,7 @@ KERNELS = "tests/test_kernels.py"
 FORMS = "tests/identities/test_regressor_forms.py"
 GEOMETRY = "tests/test_geometry.py"
 SE3 = "tests/test_se3.py"
-PARTS = "tests/test_dynamics_parts.py"
+PHYSICS = "tests/identities/test_dynamic_identities.py -k base_parameters_alone"
 BASE = (
     "tests/test_base_parameters.py"
     " -k (random_robots or book or prismatic or horizontal or wrist or keeps)"
@@ -199,13 +199,13 @@ MUTATIONS = [
         FORMS + " -k power_is_the_torque"),
     Mutation("base model", "drives that are not among the base parameters are left out",
         "def _split(model: RobotModel, base: Base", "getattr(model.drive, kind.value)",
-        "0.0 * model.drive.Fv", PARTS + " -k (base_parameters_give and gantry)"),
+        "0.0 * model.drive.Fv", PHYSICS),
     Mutation("base model", "coupling terms go to the motors before theirs",
         "def _split(model: RobotModel, base: Base", "terms[name][motors] = of_motors",
-        "terms[name][motors - 1] = of_motors", PARTS + " -k rotors_of_a_tx40"),
+        "terms[name][motors - 1] = of_motors", PHYSICS),
     Mutation("base model", "friction among the base parameters has no effect",
         "def idm_from_base(", "if extra is not None and", "if extra is None and",
-        PARTS + " -k base_parameters_with_a_friction_model"),
+        "tests/test_dynamics.py -k with_a_friction_model"),
     Mutation("drives", "dry friction helps where the joint runs backwards",
         "def torque(self, v: Array, a: Array | None)", "tau = np.sign(v)",
         "tau = np.abs(np.sign(v))", "tests/test_drive.py"),
@@ -770,7 +770,7 @@ MUTATIONS = [
         "extra[0] - coulomb, extra[1]",
         "tests/test_simulation.py -k (slider or breaks or stick)"),
     Mutation("simulation: events", "events are at the end of a look", "def first_below(",
-        "return float(root), low", "return low, low", "tests/test_simulation.py -k break_away"),
+        "return float(root), low", "return low, low", "tests/test_simulation.py -k slider"),
     Mutation("simulation: closed loop", "middle slopes of Runge and Kutta count once",
         "def follow_references(", "2.0 * middle", "1.0 * middle",
         "tests/test_identification_closed_loop.py -k converge", True),

@@ -26,7 +26,7 @@ class Oracle:
             del row["number"]
             rows.append(row)
         links = [data["links"][str(j + 1)] for j in range(len(rows))]
-        self.data, self.samples = data, data["samples"]
+        self.name, self.data, self.samples = name.removeprefix("symoro_"), data, data["samples"]
         self.model = rm.RobotModel.from_table(
             rm.DHTable.from_rows(rows),
             rm.InertialParameters([[link[key] for key in INERTIA] for link in links]),
@@ -167,3 +167,17 @@ def test_regressor_in_khalils_order(oracle):
         standard += [link[key] for link in links]
     W = rm.torque_regressor(model, q, v, a)
     close(W[..., : len(standard)] @ standard, [s["tau"] for s in oracle.samples])
+
+
+@pytest.mark.parametrize("method", ["symbolic", "numeric"])
+def test_base_parameters(oracle, method):
+    path = Path(__file__).parent / "symoro_base_parameters.json"
+    theirs = json.loads(path.read_text("utf-8"))[oracle.name]
+    base = rm.base_parameters(oracle.model, method, drive=("Ia",))
+    assert len(base) == theirs["dimension"]
+    assert base.regrouping.keys() == {name.replace("IA", "Ia") for name in theirs["grouping"]}
+    for kept, parts in theirs["grouping"].items():
+        expected = {name.replace("IA", "Ia"): value for name, value in parts.items()}
+        own = base.regrouping[kept.replace("IA", "Ia")]
+        assert dict(own) == pytest.approx(expected, abs=1e-9)
+    assert list(base.no_effect) == [name.replace("IA", "Ia") for name in theirs["no_effect"]]
