@@ -223,9 +223,10 @@ def test_numbers_keep_their_digits_at_any_size(size, model, seed):
     """A robot a size larger, in a gravity larger by as much: torques grow by its square."""
     table, bodies = model.table, model.inertia.values
     large = table.replace(**{key: size * getattr(table, key) for key in ("b", "d", "r")})
-    power = np.repeat([2, 1, 0], [6, 3, 1])
+    power, place = np.repeat([2, 1, 0], [6, 3, 1]), model.base.copy()
+    place[:3, 3] *= size
     other = model.with_table(large).with_inertia(rm.InertialParameters(bodies * size**power))
-    other = other.with_gravity(size * model.gravity)
+    other = other.with_gravity(size * model.gravity).with_base(place)
     stroke = np.where(table.sigma[table.joint_rows] == 1, size, 1.0)
     torque, entry = size**2 / stroke, size**2 / np.outer(stroke, stroke)
     states = random_state(model, np.random.default_rng(seed), 2)
