@@ -39,7 +39,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, Rebuilt, Value, as_floats, as_vector, read_only
 from ..errors import InvalidValueError, ShapeError
-from .protocols import FrictionSum, breakaway_torques, together
+from .protocols import FrictionSum, together, torques_at_rest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,7 +71,7 @@ class JointFriction(Value, ABC):
     @property
     def breakaway(self) -> Array:
         """Torques between which a joint at rest sticks, shape (2, n): lower, upper."""
-        return breakaway_torques(self)
+        return np.sort(torques_at_rest(self, self.n), axis=0)
 
     @abstractmethod
     def basis(self, v: ArrayLike) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array
 from ..errors import InvalidValueError, ShapeError
 
-_SLOWEST = 5e-324  # rad/s or m/s: smallest positive velocity
+SLOWEST = 5e-324  # rad/s or m/s: smallest positive velocity
 _ROUNDING = 1e-300  # viscous torque at this velocity
 
 
@@ -95,8 +95,7 @@ class FrictionSum:
     @property
     def breakaway(self) -> Array:
         """Torques between which a joint at rest sticks, shape (2, n): lower, upper."""
-        by_velocity, _ = by_dependence(self)
-        return np.zeros((2, self.n)) if by_velocity is None else breakaway_torques(by_velocity)
+        return np.sort(torques_at_rest(self, self.n), axis=0)
 
     @property
     def needs_position(self) -> bool:
@@ -159,12 +158,13 @@ def basis_at(friction: LinearFriction, v: ArrayLike, q: ArrayLike | None) -> Arr
     return basis(v, q) if needs_position(friction) else basis(v)
 
 
-def breakaway_torques(friction: Friction) -> Array:
-    """Limits of the torque below and above zero velocity, sorted; zero for models that need q."""
-    if needs_position(friction):
-        return np.zeros((2, friction.n))
-    limits = [friction.torque(np.full(friction.n, s * _SLOWEST)) for s in (-1.0, 1.0)]
-    return np.sort(np.where(np.abs(limits) < _ROUNDING, 0.0, limits), axis=0)
+def torques_at_rest(friction: Friction | None, n: int) -> Array:
+    """Torques just below and above zero velocity, shape (2, n), without models that need q."""
+    moving, _ = by_dependence(friction)
+    if moving is None:
+        return np.zeros((2, n))
+    limits = np.stack([moving.torque(np.full(n, s * SLOWEST)) for s in (-1.0, 1.0)])
+    return np.where(np.abs(limits) < _ROUNDING, 0.0, limits)
 
 
 def check_friction(friction: object, n: int, name: str = "friction") -> Friction:

@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from .._arrays import Array
 from ..errors import InvalidValueError
 from ..friction import Friction
-from ..friction.protocols import by_dependence
+from ..friction.protocols import torques_at_rest
 from ..model import RobotModel
 
-SLOWEST = 5e-324  # rad/s or m/s: smallest positive velocity
 _AT_REST = 1e-12  # rad/s or m/s: rounding of velocities that were set to zero
 _ROUNDING = 1e-12  # tolerance of accelerations, relative to those without friction
 _RANK = 1e-10  # rank tolerance: relative singular value
@@ -116,9 +115,8 @@ class DryFriction:
         Where torques on them are not unique, 0 as long as some within the breakaway torques exist.
         """
         if mode.holding is None:
-            return -float(
-                np.abs(self._slip_rates(mode.stuck, np.eye(len(reaction)), reaction)).max()
-            )
+            rates = self._slip_rates(mode.stuck, np.eye(len(reaction)), reaction)
+            return -float(np.abs(rates).max())
         middle, half = self._box(mode.stuck)
         return float(np.min(1.0 - np.abs(mode.holding @ reaction - middle) / half))
 
@@ -149,7 +147,7 @@ def dry_friction(model: RobotModel, drive: bool, friction: Friction | None) -> D
     n, K = model.n, model.transmission
     drives = model.drive_matrices if drive else None
     coulomb = np.zeros(n) if drives is None else drives.coulomb
-    extra = jump_at_rest(friction, n)
+    extra = torques_at_rest(friction, n)
     lower, upper = extra[0] - coulomb, extra[1] + coulomb
     joints = np.flatnonzero(lower != upper)
     rates, levels, motors = np.zeros((0, n)), np.empty(0), np.empty(0, np.int64)
@@ -165,14 +163,6 @@ def dry_friction(model: RobotModel, drive: bool, friction: Friction | None) -> D
         joint=np.concatenate([joints, motors]).astype(np.int64),
         motor=np.arange(joints.size + motors.size) >= joints.size,
     )
-
-
-def jump_at_rest(friction: Friction | None, n: int) -> Array:
-    """Torques of a friction model just below and above zero velocity, shape (2, n)."""
-    moving, _ = by_dependence(friction)
-    if moving is None:
-        return np.zeros((2, n))
-    return np.stack([moving.torque(np.full(n, s * SLOWEST)) for s in (-1.0, 1.0)])
 
 
 def check_dissipates(dry: DryFriction) -> None:

@@ -14,9 +14,9 @@ import numpy as np
 
 from .._arrays import Array
 from ..friction import Friction
-from ..friction.protocols import by_dependence, torque_at
+from ..friction.protocols import SLOWEST, by_dependence, torque_at, torques_at_rest
 from ..model import RobotModel
-from .dry_friction import SLOWEST, Mode, dry_friction, jump_at_rest
+from .dry_friction import Mode, dry_friction
 from .feedback import Feedback
 
 Law = Callable[[float, Array, Array], Array]
@@ -56,7 +56,7 @@ class Motion:
         self.n, self.control, self.wrench, self.width = n, control, wrench, width
         self.disturbance = disturbance
         self.extra, self.placed = by_dependence(friction)
-        self.jump = jump_at_rest(friction, n)
+        self.jump = torques_at_rest(friction, n)
         self.dry = self.smooth = dry_friction(model, drive, friction)
         if width is not None:  # no parts stick
             self.dry = dry_friction(model, False, None)
