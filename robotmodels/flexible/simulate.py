@@ -56,6 +56,7 @@ from ..errors import InvalidValueError, SingularMassMatrixError
 from ..geometry import DHTable
 from ..model import RobotModel
 from ..simulation import Integrator
+from ..simulation.feedback import checked
 from ..simulation.simulate import law_of, times_of
 from .linear import scales
 from .link import FlexibleLink
@@ -184,20 +185,13 @@ def simulate(
 
 def _law(law: Any, size: int, name: str) -> Callable[..., Array]:
     """Function (t, q, e, v, e_v) -> (size,) of a user's function or of constant values."""
-    if callable(user := law):
-        for count in (5, 3, 1):
-            with suppress(TypeError, ValueError):  # another number of arguments
-                signature(user).bind(*range(count))
-                break
-        else:
-            raise InvalidValueError(
-                f"{name}: expected a function of t, (t, q, v) or (t, q, v, e, e_v)."
-            )
-
-        def law(t: float, q: Array, e: Array, v: Array, ev: Array) -> Any:
-            return user(t, *(q, v, e, ev)[: count - 1])
-
-    return law_of(np.zeros(size) if law is None else law, size, None, name)[0]
+    if not callable(law):
+        return law_of(np.zeros(size) if law is None else law, size, None, name)[0]
+    for count in (5, 3, 1):
+        with suppress(TypeError, ValueError):  # another number of arguments
+            signature(law).bind(*range(count))
+            return checked(lambda t, q, e, v, ev: law(t, *(q, v, e, ev)[: count - 1]), size, name)
+    raise InvalidValueError(f"{name}: expected a function of t, (t, q, v) or (t, q, v, e, e_v).")
 
 
 def _followed(
