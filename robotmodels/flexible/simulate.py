@@ -190,7 +190,8 @@ def _law(law: Any, size: int, name: str) -> Callable[..., Array]:
     for count in (5, 3, 1):
         with suppress(TypeError, ValueError):  # another number of arguments
             signature(law).bind(*range(count))
-            return checked(lambda t, q, e, v, ev: law(t, *(q, v, e, ev)[: count - 1]), size, name)
+            few = count - 1
+            return checked(lambda t, q, e, v, ev, k=few: law(t, *(q, v, e, ev)[:k]), size, name)
     raise InvalidValueError(f"{name}: expected a function of t, (t, q, v) or (t, q, v, e, e_v).")
 
 
