@@ -1,14 +1,103 @@
-"""Logs of simulated arms nobody tuned the toolbox to, and the fit of a textbook beside them."""
+"""Robots and their logs: exact motions, odd structures, a fleet nobody tuned the toolbox to."""
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
+from identities.random_robots import random_model
 from scipy.linalg import qr
 from scipy.signal import butter, lfilter, sosfiltfilt
 
 import robotmodels as rm
-from robotmodels.identification import Log
+from robotmodels.identification import Log, choose_processing
 from robotmodels.identification.closed_loop import simulated_log, tuned_controller
+
+# --- exact motions and logs ----------------------------------------------------------------------
+
+
+def waves(rng, model, t, w, a, b, size=(1.0, 1.0)):
+    """Sums of sines about a random posture with their derivatives; amplitudes (k, n) and sizes of
+    postures and amplitudes of prismatic joints.
+    """
+    slides = model.table.sigma[model.table.joint_rows] == 1
+    a, b = (x * np.where(slides, size[1], 1.0) for x in (a, b))
+    c, s = np.cos(np.outer(t, w)), np.sin(np.outer(t, w))
+    q = rng.uniform(-1.0, 1.0, model.n) * np.where(slides, size[0], 1.0) + s @ a - c @ b
+    return q, (c * w) @ a + (s * w) @ b, (c * w**2) @ b - (s * w**2) @ a
+
+
+def swinging(model, seed, samples=4000, dt=2e-3, harmonics=5, period=4.0, size=1.0, late=0.0):
+    """Positions, velocities and accelerations of order one; `seed` may be a generator."""
+    rng = np.random.default_rng(seed)
+    w = 2.0 * np.pi * np.arange(1, harmonics + 1) / period
+    a, b = size * rng.normal(size=(2, harmonics, model.n)) / w[:, None]
+    return waves(rng, model, dt * np.arange(samples) - late, w, a, b, (1.0, 0.3))
+
+
+def torques(model, q, v, a):
+    """Torques, also of robots without masses, which would warn."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", rm.InertiaWarning)
+        return rm.idm(model, q, v, a)
+
+
+def clean_log(model, rng, noise=0.0, **options):
+    """A log whose torques are those of the model, with white noise; `rng` may be a seed."""
+    rng, dt = np.random.default_rng(rng), options.setdefault("dt", 2e-3)
+    q, v, a = swinging(model, rng, **options)
+    tau = torques(model, q, v, a)
+    return Log(dt, q, tau + noise * rng.normal(size=tau.shape), v, a)
+
+
+def recorded(name, samples, seed=7, noise=0.0, dt=0.002):
+    """A log without velocities of a robot of the catalogue that moves slowly, with friction."""
+    model, rng = rm.load(name), np.random.default_rng(seed)
+    q, v, a = swinging(model, rng, samples, dt, 5, 10.0, 0.5)
+    tau = torques(model, q, v, a) + 2.0 * v + np.sign(v) + noise * rng.normal(size=q.shape)
+    return Log(dt, q, tau)
+
+
+def raw(log, decimation=1, dead_band=0.0):
+    """No filter and nothing cut: positions, velocities and accelerations of the log are exact."""
+    return choose_processing(
+        log, filtered=False, decimation=decimation, edges=0.0, dead_band=dead_band
+    )
+
+
+def odd_robots():
+    """Serial, prismatic, branched and coupled arms with turned bases, tools and zero lengths."""
+
+    def robot(seed, f, **options):
+        return random_model(np.random.default_rng(seed), f, drive=True, **options)
+
+    tree = robot(16, 5, tree=True)
+    # axes that are nearly aligned are taken as aligned: torques then differ by the angle
+    beta = np.where(abs(tree.table.beta) < 1e-4, 0.0, tree.table.beta)
+    bodies = random_model(np.random.default_rng(7), 3, prismatic=False, drive=True)
+    return {
+        "serial": robot(5, 4, prismatic=False),
+        "prismatic": robot(7, 4),
+        "tree": tree.with_table(tree.table.replace(beta=beta)),
+        "fixed frame": robot(9, 5, fixed=True),
+        "coupled wrist": robot(12, 4, prismatic=False, transmission=True),
+        "zero lengths": rm.RobotModel.from_table(
+            rm.DHTable(antecedent=[0, 1, 2], sigma=[0, 0, 0], alpha=[0.0, np.pi / 2, -np.pi / 2]),
+            inertia=bodies.inertia,
+            drive=bodies.drive,
+        ),
+        "rx90": rm.load("rx90"),
+    }
+
+
+def two_links(**drive):
+    """A planar arm with bodies and drives."""
+    tensors = [np.diag([0.02, 0.1, 0.1]), np.diag([0.01, 0.05, 0.05])]
+    com = [[0.3, 0.02, 0.0], [0.2, 0.01, 0.0]]
+    bodies = rm.InertialParameters.from_com([3.0, 2.0], com, tensors)
+    return rm.load("planar_2r").with_inertia(bodies).with_drive(rm.DriveParameters(**drive))
+
+
+# --- arms of a fleet -----------------------------------------------------------------------------
 
 KINDS = ("slow", "fast", "badly exciting", "closed loop")
 SPEED = {"slow": 0.5, "fast": 2.5, "badly exciting": 0.3, "closed loop": 1.2}
@@ -67,18 +156,15 @@ def arm(rng):
 
 def motion(rng, model, seconds, dt, kind):
     """Positions, velocities and accelerations of five harmonics; badly exciting ones of two."""
-    n, slides = model.n, model.table.sigma == 1
     lowest = {"slow": 1.0 / seconds, "badly exciting": 0.1}.get(kind, rng.uniform(0.1, 0.25))
     w = 2.0 * np.pi * lowest * np.arange(1, 6)
-    size = SPEED[kind] * rng.normal(size=(2, 5, n)) / np.sqrt(5.0) / w[:, None]
+    a, b = SPEED[kind] * rng.normal(size=(2, 5, model.n)) / np.sqrt(5.0) / w[:, None]
     if kind == "badly exciting":
-        size[:, 2:] = 0.0
-        size[:, :, rng.random(n) < 0.4] *= 0.2
-    a, b = size * np.where(slides, 0.25, 1.0)
-    t = dt * np.arange(round(seconds / dt))
-    c, s = np.cos(np.outer(t, w)), np.sin(np.outer(t, w))
-    q = rng.uniform(-1.0, 1.0, n) * np.where(slides, 0.2, 1.0) + s @ a - c @ b
-    return q, (c * w) @ a + (s * w) @ b, (c * w**2) @ b - (s * w**2) @ a
+        few = rng.random(model.n) < 0.4
+        for x in (a, b):
+            x[2:] = 0.0
+            x[:, few] *= 0.2
+    return waves(rng, model, dt * np.arange(round(seconds / dt)), w, a, b, (0.2, 0.25))
 
 
 def case(seed):
@@ -146,16 +232,13 @@ def pair(seed, seconds=30.0):
     rng = np.random.default_rng(seed)
     model, dt = arm(rng), 1.0 / float(rng.choice([250, 500]))
     of_load, at_rest, spring = rng.uniform(0.0, 0.03, 3)
-    slides, n = model.table.sigma == 1, model.n
     w = 2.0 * np.pi / seconds * np.arange(1, int(0.5 * seconds) + 1)
     t = dt * np.arange(round(seconds / dt))
-    c, s = np.cos(np.outer(t, w)), np.sin(np.outer(t, w))
     logs = []
     for _ in range(2):
-        size = rng.normal(size=(2, len(w), n)) / np.sqrt(len(w)) / np.maximum(w, 0.6)[:, None]
-        a, b = size * np.where(slides, 0.25, 1.2)
-        q = rng.uniform(-1.0, 1.0, n) * np.where(slides, 0.2, 1.0) + s @ a - c @ b
-        v, acc = (c * w) @ a + (s * w) @ b, (c * w**2) @ b - (s * w**2) @ a
+        size = rng.normal(size=(2, len(w), model.n)) / np.sqrt(len(w))
+        a, b = 1.2 * size / np.maximum(w, 0.6)[:, None]
+        q, v, acc = waves(rng, model, t, w, a, b, (0.2, 0.25 / 1.2))
         tau = rm.idm(model, q, v, acc)
         load = tau.std(axis=0)
         tau = tau + of_load * np.abs(rm.idm(model, q, v, acc, drive=False)) * np.tanh(v / 0.05)

@@ -1,12 +1,15 @@
-"""Exciting trajectories: gradients, limits, quality beside random motions, and the budget."""
+"""Exciting trajectories: gradients, limits, quality beside random motions, files, the command."""
+
+import json
 
 import numpy as np
 import pytest
+import yaml
 from identities.random_robots import random_model, random_state
 
 import robotmodels as rm
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
-from robotmodels.identification import exciting_trajectory
+from robotmodels.identification import exciting_trajectory, write_trajectory
 from robotmodels.identification.excitation.limits import (
     excitation_limits,
     excitation_torques,
@@ -15,7 +18,7 @@ from robotmodels.identification.excitation.limits import (
 from robotmodels.identification.excitation.motions import MotionBasis
 from robotmodels.identification.excitation.objective import ExcitationProblem
 from robotmodels.obstacles import Box, Plane, Sphere
-from robotmodels.trajectories import MotionLimits
+from robotmodels.trajectories import MotionLimits, quintic
 
 ROBOTS = {
     "serial": {"f": 4},
@@ -181,3 +184,63 @@ def test_mistakes_are_named():
     ):
         with pytest.raises(error, match=message):
             quick(**options)
+
+
+# --- files and the command ------------------------------------------------------------------------
+
+SHORT = {"harmonics": 3, "baseline": 2, "iterations": 5}
+
+
+@pytest.fixture(scope="module")
+def stanford():
+    return quick("stanford_arm", **SHORT)
+
+
+@pytest.mark.parametrize("degrees", [False, True])
+def test_csv_holds_samples_and_their_units(stanford, tmp_path, degrees):
+    path = tmp_path / "a.csv"
+    write_trajectory(stanford, path, rate=50.0, degrees=degrees)
+    header = path.read_text(encoding="utf-8").splitlines()[0].split(",")
+    angle = "deg" if degrees else "rad"
+    assert header[:4] == ["t (s)", f"q joint_1 ({angle})", f"q joint_2 ({angle})", "q joint_3 (m)"]
+    assert header[18] == f"a joint_6 ({angle}/s^2)"
+    rows = np.loadtxt(path, delimiter=",", skiprows=1)
+    assert np.allclose(rows[:, 0], np.arange(501) / 50.0)
+    factor = np.where(np.arange(6) == 2, 1.0, 180.0 / np.pi if degrees else 1.0)
+    for k, values in enumerate(
+        (stanford.trajectory.q, stanford.trajectory.v, stanford.trajectory.a)
+    ):
+        expected = values(rows[:, 0]) * factor
+        assert np.allclose(rows[:, 1 + 6 * k : 7 + 6 * k], expected, rtol=1e-10, atol=1e-10)
+
+
+def test_npz_ros_and_other_trajectories(stanford, tmp_path):
+    write_trajectory(stanford, tmp_path / "a.npz", rate=30.0)
+    with np.load(tmp_path / "a.npz") as data:
+        assert np.array_equal(data["q"], stanford.trajectory.q(data["t"]))
+        assert data["units"].tolist() == ["rad", "rad", "m", "rad", "rad", "rad"]
+    write_trajectory(stanford, tmp_path / "a.yaml", rate=30.0)
+    message = yaml.safe_load((tmp_path / "a.yaml").read_text(encoding="utf-8"))
+    assert message["joint_names"] == list(stanford.model.table.joint_names)
+    assert len(message["points"]) == 301
+    point = message["points"][100]
+    assert point["time_from_start"] == {"sec": 3, "nanosec": 333333333}
+    assert np.allclose(point["accelerations"], stanford.trajectory.a(100 / 30.0), atol=1e-10)
+    assert set(point) == {"positions", "velocities", "accelerations", "time_from_start"}
+    move = quintic([0.0, 1.0], [1.0, 2.0], duration=0.35)
+    write_trajectory(move, tmp_path / "b.csv", rate=10.0, names=["x", "y"], turns=[True, False])
+    rows = np.loadtxt(tmp_path / "b.csv", delimiter=",", skiprows=1)
+    assert rows[:, 0].tolist() == [0.0, 0.1, 0.2, 0.3]
+
+
+@pytest.mark.parametrize("kind", ["fourier", "spline"])
+def test_json_makes_the_same_motion_bit_by_bit(kind, tmp_path):
+    result = quick(kind=kind, **SHORT)
+    write_trajectory(result, tmp_path / "a.json")
+    data = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
+    again = getattr(rm.trajectories, data["motion"]["generator"])(**data["motion"]["arguments"])
+    t = np.linspace(0.0, 10.0, 77)
+    assert np.array_equal(again.q(t), result.trajectory.q(t))
+    assert np.array_equal(again.a(t), result.trajectory.a(t))
+    assert data["condition"] == result.condition
+    assert data["limits"]["torque"] == [None, None]

@@ -5,14 +5,16 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from identification_fleet import case, pair
+from identification_fleet import case, pair, recorded, swinging
 
 import robotmodels as rm
 from robotmodels.errors import InvalidValueError
-from robotmodels.identification import Log, fit
+from robotmodels.identification import Log, fit, synchronisation
 from robotmodels.identification.checks import check_joints
+from robotmodels.identification.delay import SynchronisationStatus
 from robotmodels.identification.signals import zero_phase
-from robotmodels.logs import FindingKind, Severity, check_log
+from robotmodels.logs import FindingKind, Severity, check_log, with_delay
+from robotmodels.logs.stretches import stretches
 
 
 def mistakes(n):
@@ -176,3 +178,109 @@ def test_what_cannot_be_judged_is_no_mistake(good):
         assert not useless(check_joints(part, model))
     (short,) = check_joints(log.rows(0, 30), model)
     assert "were not checked: log: no recording is longer than" in short.sentence
+
+
+# --- delay between positions and torques ---------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def robot():
+    drive = rm.DriveParameters(Ia=np.full(6, 0.3), Fv=np.full(6, 2.0), Fc=np.full(6, 1.5))
+    return rm.load("rx90").with_drive(drive)
+
+
+def simulated(model, rate=1000.0, late=0.0, seed=3):
+    """Noisy log of a robot, its torques late."""
+    options = {"samples": round(6.0 * rate), "dt": 1.0 / rate, "period": 5.0, "size": 1.2}
+    moves, moved = (swinging(model, seed, late=x, **options) for x in (0.0, late))
+    noise = np.random.default_rng(seed).normal(size=(2, *moves[0].shape))
+    tau = rm.idm(model, *moved)
+    return Log(1.0 / rate, moves[0] + 1e-4 * noise[0], tau + 0.05 * noise[1])
+
+
+@pytest.mark.parametrize(("rate", "late"), [(1000.0, -0.004), (5000.0, 0.0013)])
+def test_delays_of_simulated_logs_are_found_within_a_part_of_a_sample(robot, rate, late):
+    found = synchronisation(simulated(robot, rate, late), robot)
+    assert found.status is SynchronisationStatus.FOUND
+    assert found.delay == pytest.approx(late, abs=0.2e-3)
+    assert found.delay == pytest.approx(late, abs=5.0 * found.standard_error)
+    assert found.is_out_of_step
+    known = np.isfinite(found.joint_delays)
+    assert known.sum() >= 3
+    assert np.median(found.joint_delays[known]) == pytest.approx(late, abs=1e-3)
+
+
+def test_a_delay_that_is_removed_is_not_found_again(robot):
+    log = simulated(robot, late=0.0036)
+    again = synchronisation(with_delay(log, synchronisation(log, robot).delay), robot)
+    assert again.status.is_success
+    assert not again.is_out_of_step
+    assert abs(again.delay) < 0.05e-3
+
+
+def test_delays_beyond_those_that_are_tried_are_reported(robot):
+    log = simulated(robot, late=0.06)
+    found = synchronisation(log, robot)
+    assert found.status is SynchronisationStatus.AT_THE_END
+    assert not found.is_out_of_step
+    assert synchronisation(log, robot, within=0.1).delay == pytest.approx(0.06, abs=0.5e-3)
+    (finding,) = check_joints(log, robot)
+    assert finding.kind is FindingKind.OUT_OF_STEP
+
+
+def test_a_single_sine_determines_no_delay():
+    one = rm.RobotModel.from_table(rm.DHTable(antecedent=[0], sigma=[0]))
+    t = np.arange(0.0, 10.0, 0.001)[:, None]
+    found = synchronisation(Log(0.001, np.sin(t), np.cos(t - 0.3)), one)
+    assert not found.is_out_of_step
+    assert not found.status.is_success
+
+
+def test_motion_that_excites_little_is_named(robot):
+    log = simulated(robot)
+    q = np.where(np.arange(6) == 0, log.q, 0.3)
+    found = {f.kind: f for f in check_joints(Log(log.dt, q, log.tau), robot)}
+    assert "base parameters" in found[FindingKind.NOT_EXCITING].sentence
+
+
+# --- long logs -----------------------------------------------------------------------------------
+
+
+def test_stretches_cover_a_log_and_keep_its_recordings():
+    q = np.arange(1000.0)[:, None]
+    log = Log(0.01, q, -q, q + 1.0, q + 2.0, starts=(0, 430, 435))
+    part = stretches(log, 50, 300)
+    assert np.array_equal(part.v, part.q + 1.0)
+    assert np.array_equal(part.a, part.q + 2.0)
+    assert len(part) <= 300
+    assert part.q[0, 0] == 0.0
+    assert part.q[-1, 0] == 984.0  # the 15 samples after it are no stretch
+    assert np.array_equal(part.tau, -part.q)
+    for rows in part.recordings():
+        inside = part.q[rows, 0]
+        assert (np.diff(inside) == 1.0).all()
+        assert inside[-1] < 430.0 or inside[0] >= 435.0
+    short = Log(0.01, q, q, starts=tuple(range(0, 1000, 4)))
+    assert 0 < len(stretches(short, 50, 300)) <= 300
+
+
+def test_what_a_long_log_hides_is_found_in_stretches_and_said():
+    model, whole = rm.load("planar_2r"), recorded("planar_2r", 120_000, noise=0.01)
+    assert check_joints(whole, model) == ()
+    wrong = Log(whole.dt, whole.q, whole.tau * [-1.0, 1.0])
+    (found,) = [f for f in check_joints(wrong, model) if f.joints == ("1",)]
+    assert "of 120000 samples" in found.sentence
+
+
+def test_what_happens_once_in_a_long_log_is_found():
+    q = np.sin(1e-3 * np.arange(250_000))[:, None] * [1.0, 0.7]
+    q[99_950:100_060, 1] = q[99_950, 1]  # a sensor that stops, over the end of a piece
+    q[230_000:, 0] += 0.5
+    tau = np.cos(q) + 1e-3 * np.random.default_rng(0).normal(size=q.shape)
+    q[150_000, 0] += 2.0
+    log = Log(1e-3, q, tau)
+    found = {(f.kind, f.joints): f.sentence for f in check_log(log)}
+    assert "repeat, from row 99950" in found[FindingKind.STUCK, ("2",)]
+    assert "the first at row 150000" in found[FindingKind.SPIKES, ("1",)]
+    assert "at row 230000" in found[FindingKind.JUMP, ("1",)]
+    assert (FindingKind.JUMP, ("2",)) not in found

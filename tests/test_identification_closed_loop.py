@@ -1,10 +1,11 @@
-"""Methods that simulate the controlled robot recover the parameters of exact logs."""
+"""Methods that simulate the controlled robot: exact on exact logs, unbiased on noisy ones."""
 
 import pickle
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from identification_fleet import raw, swinging, two_links
 from identities.random_robots import random_bodies, random_model
 
 import robotmodels as rm
@@ -18,7 +19,6 @@ from robotmodels.identification import (
     Log,
     OutputError,
     Wls,
-    choose_processing,
     equations,
     hausman_test,
     reduce_equations,
@@ -26,7 +26,7 @@ from robotmodels.identification import (
     tuned_controller,
 )
 from robotmodels.identification.closed_loop import method as method_module
-from robotmodels.identification.closed_loop.loop import closed_loop, friction_rates, robot_of
+from robotmodels.identification.closed_loop.loop import closed_loop, friction_rates
 from robotmodels.identification.closed_loop.method import instrument_step
 from robotmodels.identification.fit import _identifiable
 from robotmodels.identification.forms import Block
@@ -78,22 +78,15 @@ def other(arm, seed=1, spread=0.2):
     return out
 
 
-def motion(n, seconds, dt, seed, size=0.8):
-    """References: sums of sines whose velocities are exact."""
-    rng, t = np.random.default_rng(seed), np.arange(0.0, seconds, dt)[:, None]
-    q, v = np.zeros((len(t), n)), np.zeros((len(t), n))
-    for k in range(1, 5):
-        w = 2.0 * np.pi * k * 0.35
-        c, p = rng.normal(size=n) * size / k, rng.uniform(0, 2 * np.pi, n)
-        q += c * np.sin(w * t + p)
-        v += c * w * np.cos(w * t + p)
-    return q, v
+def motion(arm, seconds, dt, seed=4):
+    """References and their exact velocities."""
+    return swinging(arm, seed, round(seconds / dt), dt, 4, 1.0 / 0.35, 1.2)[:2]
 
 
 def recorded(kind, seconds=3.0, dt=2e-3, substeps=1):
     """A robot, its controller, its log without noise, and the width of its dry friction."""
     arm = robot(kind)
-    q_ref, v_ref = motion(arm.n, seconds, dt, 0)
+    q_ref, v_ref = motion(arm, seconds, dt)
     # tuned for another robot, so that the tracking errors are not small
     control = tuned_controller(other(arm, 11), q_ref, 4.0, period=dt, feed_forward=False)
     width = dt / substeps * friction_rates(arm, q_ref).dry
@@ -103,10 +96,7 @@ def recorded(kind, seconds=3.0, dt=2e-3, substeps=1):
 
 def problem(arm, log, width=0.0, decimation=1):
     """Equations and factors in the identifiable parameters, and the true values."""
-    choices = choose_processing(
-        log, decimation=decimation, dead_band=width, edges=0.0, filtered=False
-    )
-    system = equations(rm.base_parameters(arm, drive=True), log, choices)
+    system = equations(rm.base_parameters(arm, drive=True), log, raw(log, decimation, width))
     system, factors, _, _ = _identifiable(system, reduce_equations(system))
     return system, factors, values_of(system, arm)
 
@@ -143,7 +133,7 @@ def test_simulated_accelerations_are_those_of_the_direct_model(kind):
 def test_the_motion_is_that_of_simulate_and_steps_converge_with_order_four():
     arm = robot("rx90")
     arm = arm.with_drive(replace(arm.drive, Fc=np.zeros(6)))
-    q_ref, v_ref = motion(6, 0.2, 1e-2, 0)
+    q_ref, v_ref = motion(arm, 0.2, 1e-2)
     control = tuned_controller(arm, q_ref, 4.0, period=1e-2, feed_forward=False)
     logs = [simulated_log(arm, control, q_ref, v_ref, 1e-2, substeps=s) for s in (1, 2, 16)]
     t = 1e-2 * np.arange(len(q_ref))
@@ -172,20 +162,6 @@ def test_controllers_hold_limit_and_integrate():
     assert (np.abs(low.tau) == limited.limit).any()
     fine = simulated_log(arm, replace(control, period=1e-3), start, rest, 2e-3)
     assert np.abs(fine.q - simulated_log(arm, control, start, rest, 2e-3).q).max() > 1e-6
-
-
-def test_a_robot_of_base_parameters_has_the_torques_of_the_equations():
-    arm = robot("tx40")
-    base = rm.base_parameters(arm, drive=("Ia", "Fv"))
-    q_ref, v_ref = motion(6, 0.2, 1e-3, 0)
-    system = equations(base, Log(1e-3, q_ref, v_ref), choose_processing(Log(1e-3, q_ref, v_ref)))
-    twin, a = robot_of(system, base.values(arm)), np.ones((200, 6))
-    assert not any(x.any() for x in (twin.drive.Fc, twin.drive.offset, twin.transmission.Fcm))
-    assert twin.transmission.Iam.any()
-    W = rm.torque_regressor(arm, q_ref, v_ref, a, drive=("Ia", "Fv"), columns=base.names)
-    assert np.allclose(
-        rm.idm(twin, q_ref, v_ref, a), W @ base.values(arm), rtol=1e-9, atol=1e-9
-    )  # fmt: skip
 
 
 # --- methods --------------------------------------------------------------------------------------
@@ -294,11 +270,6 @@ def test_mistakes_are_named():
         closed_loop(system, truth, Controller([1.0, 1.0], 1.0))
     with pytest.raises(InvalidValueError, match="multiple or a whole part"):
         closed_loop(system, truth, replace(control, period=0.003))
-    for wrong in ({"output": "speed"}, {"iterations": 0}, {"controller": 1.0}):
-        with pytest.raises(InvalidValueError, match=next(iter(wrong))):
-            OutputError(**wrong)
-    with pytest.raises(ShapeError, match="one length"):
-        Controller([1.0, 1.0], [1.0, 2.0, 3.0])
     curved = rm.friction.ViscousFriction(np.ones(arm.n))
     rest = rm.base_parameters(arm, drive=("Ia",), friction=curved)
     with pytest.raises(InvalidValueError, match="friction: expected that of the drives"):
@@ -321,7 +292,7 @@ def stiff_robot(inertia, Fv, Fc):
 
 def stiff_problem(arm, seconds, dt, decimation=1):
     """Log of exact torques on a motion without tracking errors, and its problem."""
-    q, v = motion(2, seconds, dt, 2)
+    q, v = motion(arm, seconds, dt, 2)
     a = central_differences(v, dt)
     log = Log(dt, q, rm.idm(arm, q, v, a), v, a, q, v)
     return log, *problem(arm, log, 0.02, decimation)
@@ -341,3 +312,57 @@ def test_stiff_joints_are_integrated_in_more_steps(inertia, Fv, Fc, dt):
     rough = closed_loop(system, truth, substeps=1)
     assert rough.substeps == 1
     assert "joint_2 is stiff" in " ".join(rough.notes)
+
+
+# --- noise of the positions: least squares are biased and the test says so, the others are not ----
+
+PERIOD, WIDTH = 2e-3, 0.01
+
+
+def studied(count, position, decimation):
+    """Of so many noisy logs: verdicts of the test, and errors of the least squares that it tests in
+    their standard errors.
+    """
+    model = two_links(Ia=[0.1, 0.05], Fv=[1.0, 0.5], Fc=[0.8, 0.4], offset=[0.1, -0.1])
+    q, v = swinging(model, 0, round(3.0 / PERIOD), PERIOD, 5, 2.0, 1.55)[:2]
+    control = tuned_controller(model, q, 8.0, period=PERIOD, feed_forward=False)
+    exact = simulated_log(model, control, q, v, PERIOD, width=WIDTH)
+    base = rm.base_parameters(model, drive=True)
+    truth, rng = base.values(model), np.random.default_rng(1)
+    method = Instrumental(control, start=1.1 * truth, lags=0, width=WIDTH)
+    verdicts, off = [], []
+    for _ in range(count):
+        e = position * rng.normal(size=exact.q.shape)
+        de = central_differences(e, PERIOD)
+        log = replace(
+            exact, q=exact.q + e, tau=exact.tau + 0.5 * rng.normal(size=e.shape),
+            v=exact.v + de, a=exact.a + central_differences(de, PERIOD),
+        )  # fmt: skip
+        system = equations(base, log, raw(log, decimation, 0.05))
+        found = method.solve(system, reduce_equations(system))
+        verdict = hausman_test(system, found, lags=0)
+        off.append((found.values + verdict.effect - truth) / verdict.least_squares_errors)
+        verdicts.append(verdict)
+    return verdicts, np.array(off)
+
+
+def test_the_test_names_parameters_whose_bias_matters_and_no_others():
+    verdicts, off = studied(6, 3e-5, 1)
+    bias = np.abs(off.mean(axis=0))
+    named = np.mean([verdict.biased_parameters for verdict in verdicts], axis=0)
+    assert (bias > 2.0).sum() >= 3
+    assert (named[bias > 2.0] == 1.0).all()
+    assert (bias < 0.5).sum() >= 3
+    assert (named[bias < 0.5] == 0.0).all()
+    first = verdicts[0]
+    named = [x for x, bad in zip(first.names, first.biased_parameters, strict=True) if bad]
+    assert first.p < 1e-3
+    assert all(f"{name} (" in first.sentence for name in named)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(("position", "decimation"), [(0.0, 10), (3e-6, 1), (3e-5, 10)])
+def test_noise_whose_bias_does_not_matter_is_not_rejected(position, decimation):
+    verdicts, off = studied(10, position, decimation)
+    assert np.abs(off.mean(axis=0)).max() < 0.7  # half a standard error, and what ten logs tell
+    assert np.mean([verdict.biased for verdict in verdicts]) <= 0.1

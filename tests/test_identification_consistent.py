@@ -179,7 +179,7 @@ def test_the_weight_trades_residuals_for_nearness(rng):
     assert not last.fit.active
 
 
-def test_mistakes_are_named(rng):
+def test_mistakes_are_named(rng, monkeypatch):
     model = arm(rng)
     base, R, y, rest, *_ = noisy(model, rng, 0.1)
     b = len(base)
@@ -201,14 +201,9 @@ def test_mistakes_are_named(rng):
         CenterOfMassBox(1, [1, 0, 0], [0, 1, 1])
     with pytest.raises(InvalidValueError, match="unit vectors"):
         CenterOfMassEllipsoid(1, [0, 0, 0], [1, 1, 1], 2 * np.eye(3))
-
-
-def test_without_the_solver(monkeypatch, rng):
-    model = arm(rng)
-    base, R, y, rest, *_ = noisy(model, rng, 0.1)
     monkeypatch.setitem(sys.modules, "cvxpy", None)
     with pytest.raises(MissingExtraError, match=r"robotmodels\[cones\]"):
-        fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(model, 6.0))
+        fit_consistent(base, R, y, rest=rest, prior=prior)
 
 
 # --- noisy logs ----------------------------------------------------------------------------------

@@ -5,15 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from identification_fleet import raw, swinging
 
 from robotmodels.drive import DriveParameters
 from robotmodels.dynamics import idm, with_payload
-from robotmodels.errors import InvalidValueError
 from robotmodels.friction import LoadFriction, StribeckFriction
 from robotmodels.identification import (
     KnownPayload,
     LoadedLog,
-    choose_processing,
     fit,
     fit_friction,
     identify_drive_gains,
@@ -22,7 +21,6 @@ from robotmodels.identification import (
 from robotmodels.identification.drive_gains import motor_side
 from robotmodels.inertia import PARAMETERS, InertialParameters
 from robotmodels.logs import Log
-from robotmodels.minimal_parameters import base_parameters
 from robotmodels.robots import load
 
 DT = 0.01
@@ -30,17 +28,12 @@ MASS, COM, INERTIA = 3.0, np.array([0.02, 0.03, 0.1]), np.diag([0.01, 0.02, 0.01
 TRUE = InertialParameters.from_com([MASS], COM[None], INERTIA[None]).values[0]
 
 
-def motion(n, samples, seed, size=1.0, locked=()):
+def motion(model, samples, seed, size=0.5, locked=()):
     """Sums of sines with their derivatives."""
-    rng, t = np.random.default_rng(seed), DT * np.arange(samples)[:, None]
-    q, v, a = np.zeros((3, samples, n))
-    for k in range(1, 6):
-        w, part, phase = 0.2 * np.pi * k, size * rng.normal(size=n) / k, rng.uniform(0.0, 6.28, n)
-        part[list(locked)] = 0.0
-        q += part * np.sin(w * t + phase)
-        v += part * w * np.cos(w * t + phase)
-        a -= part * w**2 * np.sin(w * t + phase)
-    return q, v, a
+    moved = [np.array(x) for x in swinging(model, seed, samples, DT, 5, 10.0, size)]
+    for x in moved:
+        x[:, list(locked)] = 0.0
+    return moved
 
 
 def robot(name="planar_2r", offset=0.3, Ia=0.1):
@@ -64,16 +57,10 @@ def logged(model, moved, noise=0.0, seed=0, more=0.0, gains=1.0):
     return Log(DT, moved[0], np.linalg.solve(side, tau.T).T, moved[1], moved[2])
 
 
-def raw(log, decimation=1, dead_band=0.0):
-    return choose_processing(
-        log, filtered=False, dead_band=dead_band, edges=0.0, decimation=decimation
-    )
-
-
 def pair(name="planar_2r", noise=0.0, seed=0, samples=800, carried=(MASS, COM, INERTIA), **options):
     """A robot, its log without and with a load."""
     model = robot(name)
-    moved = (motion(model.n, samples, k) for k in (1, 2))
+    moved = (motion(model, samples, k) for k in (1, 2))
     robots = zip(
         (model, with_payload(model, *carried)), moved, (2 * seed, 2 * seed + 1), strict=True
     )
@@ -108,7 +95,7 @@ def test_exact_logs_give_the_exact_payload(name, together):
 
 def test_friction_that_differs_between_the_logs():
     model, bare, _ = pair()
-    full = logged(with_payload(robot(offset=-1.0), MASS, COM, INERTIA), motion(2, 800, 2))
+    full = logged(with_payload(robot(offset=-1.0), MASS, COM, INERTIA), motion(model, 800, 2))
     wrong = identify_payload(model, full, bare, processing=raw(bare))
     right = identify_payload(model, full, bare, changed=("offset",), processing=raw(bare))
     assert abs(wrong.mass - MASS) > 1e-3
@@ -123,7 +110,7 @@ def test_standard_errors_of_payloads_are_true():
         found = identify_payload(model, full, bare, processing=choices)
         scores.append((found.values - true) / found.standard_errors)
     check_scores(scores)
-    without = logged(model, motion(2, 1500, 2), 0.5, 1)
+    without = logged(model, motion(model, 1500, 2), 0.5, 1)
     found = identify_payload(model, without, bare, processing=choices)
     assert found.status.name == "INSIGNIFICANT"
 
@@ -133,7 +120,7 @@ def test_standard_errors_of_payloads_are_true():
 def test_parameters_that_the_reference_did_not_show_are_not_those_of_the_payload(locked):
     """A joint that stood still without the load moves with it: no error goes to the load."""
     model, _, full = pair("rx90", 0.02)
-    bare = logged(model, motion(6, 800, 1, locked=[locked]), 0.02, 4)
+    bare = logged(model, motion(model, 800, 1, locked=[locked]), 0.02, 4)
     reference = fit(model, bare, processing=raw(bare), checked=False)
     assert reference.details.unidentifiable
     found = identify_payload(model, full, reference)
@@ -198,7 +185,7 @@ def friction_log(curve, name="planar_2r", samples=4000, noise=0.0, seed=0):
     """A robot and its log with friction of its own; of a load without rotors and couplings."""
     of_load = isinstance(curve, LoadFriction)
     model = robot(name, Ia=0.0).with_transmission(None) if of_load else robot(name)
-    moved = motion(model.n, samples, 1, 0.3)
+    moved = motion(model, samples, 1, 0.15)
     links = idm(model.with_drive(DriveParameters.zeros(model.n)), *moved)
     more = curve.under_load(moved[1], links) if of_load else curve.torque(moved[1])
     return model, logged(model, moved, noise, seed, more)
@@ -234,19 +221,3 @@ def test_an_exact_log_gives_the_exact_friction_by_load():
     assert found.significant.tolist() == [True, False]
     errors = found.standard_errors[-2:]
     assert (np.abs(found.friction.Fl - [0.2, 0.0]) < 4.5 * errors).all()
-
-
-def test_mistakes_are_named():
-    model, log, full = pair(samples=600)
-    other = LoadedLog(Log(0.02, log.q, log.tau), KnownPayload(1.0))
-    for call, words in (
-        (lambda: identify_payload(model, full, log, 0), "frame"),
-        (lambda: identify_payload(model, full, log, changed=("mass",)), "Ia"),
-        (lambda: identify_drive_gains(model, log, log), "at least one LoadedLog"),
-        (lambda: identify_drive_gains(model, log, other), "sampling periods"),
-        (lambda: KnownPayload(1.0, inertia=INERTIA), "com"),
-        (lambda: fit_friction(model, log, exponents=(0.0,)), "exponents"),
-        (lambda: fit_friction(model, log, base=base_parameters(model, drive=("Fv",))), "Fc"),
-    ):
-        with pytest.raises(InvalidValueError, match=words):
-            call()

@@ -1,13 +1,25 @@
-"""Signals of logs: filter, differences, parallel decimation, edges, dead bands, choices."""
+"""Signals of logs: filter, differences, edges, dead bands; equations at scale, in any pools."""
 
 from __future__ import annotations
 
+import multiprocessing
+import pickle
+import sys
+import threading
+import time
+import tracemalloc
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import replace
+from functools import cache
+
 import numpy as np
 import pytest
+from identification_fleet import recorded
 
 import robotmodels as rm
-from robotmodels.errors import InvalidValueError, ShapeError
-from robotmodels.identification import choose_processing, equations
+from robotmodels.identification import choose_processing, equations, reduce_equations
+from robotmodels.identification.forms import EquationForm
 from robotmodels.identification.signals import (
     central_differences,
     piece_signals,
@@ -67,19 +79,8 @@ def test_central_differences_have_their_order(accuracy):
     assert central_differences(np.array([1.0, 3.0]), 0.5, accuracy).tolist() == [4.0, 4.0]
 
 
-def moved(N: int) -> Log:
-    """A log of a robot that moves, free of noise; its torques mean nothing."""
-    rng = np.random.default_rng(3)
-    t = DT * np.arange(N)[:, None]
-    q = sum(
-        rng.normal(size=6) * 0.4 * np.sin(2.0 * np.pi * f * t + rng.normal(size=6))
-        for f in (0.13, 0.29, 0.53)
-    )
-    return Log(DT, q, rng.normal(size=q.shape))
-
-
 def test_edges_are_cut_on_every_channel_of_every_recording():
-    log = moved(12_000)
+    log = recorded("rx90", 12_000, dt=DT)
     log = Log(DT, log.q, log.tau, starts=(0, 1_000, 5_000))
     chosen = choose_processing(log, edges=0.75)
     found = signals(log, chosen)
@@ -104,7 +105,7 @@ def test_dead_bands_are_four_standard_deviations_of_the_velocity_noise(rng):
 
 
 def test_samples_in_the_dead_band_take_no_part():
-    log = moved(20_000)
+    log = recorded("rx90", 20_000, dt=DT)
     base = base_parameters(rm.load("rx90"), drive=("Fv", "Fc"))
     band = np.linspace(0.05, 0.3, log.n)
     chosen = choose_processing(log, decimation=1, dead_band=band)
@@ -123,7 +124,7 @@ def test_samples_in_the_dead_band_take_no_part():
 
 
 def test_measured_velocities_are_taken_and_filtered_alike():
-    log = moved(20_000)
+    log = recorded("rx90", 20_000, dt=DT)
     v = np.cos(np.arange(20_000.0))[:, None] * np.ones(log.n)
     chosen = choose_processing(log, cutoff=20.0)
     found = signals(Log(DT, log.q, log.tau, v=v), chosen)
@@ -133,15 +134,129 @@ def test_measured_velocities_are_taken_and_filtered_alike():
     np.testing.assert_array_equal(signals(Log(DT, log.q, log.tau, v=v), raw).v, v[100:-100])
 
 
+# --- at scale -----------------------------------------------------------------------------------
+
+
+@cache
+def system(decimation: int = 5, name: str = "planar_2r", starts: tuple[int, ...] = (0, 40_123)):
+    """Equations in more pieces than a window holds; two recordings."""
+    log = recorded(name, 90_000, noise=0.01)
+    log = Log(log.dt, log.q, log.tau, starts=starts)
+    base = base_parameters(rm.load(name), drive=("Fv", "Fc"))
+    return equations(base, log, choose_processing(log, decimation=decimation))
+
+
+def bits(factors) -> bytes:
+    counts = factors.counts.tobytes() + factors.left_out.tobytes()
+    return b"".join(R.tobytes() for R in factors.factors) + counts
+
+
+class Shuffled(Executor):
+    """Begins some tasks late, so that others are done before them."""
+
+    def __init__(self, pool):
+        self.pool, self.number, self.lock = pool, 0, threading.Lock()
+
+    def submit(self, fn, /, *args, **kwargs):
+        with self.lock:
+            self.number += 1
+            wait = 0.01 * (self.number * 7 % 3)
+        return self.pool.submit(lambda: (time.sleep(wait), fn(*args, **kwargs))[1])
+
+
+def dask(stack):
+    import distributed
+
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+    cluster = stack.enter_context(distributed.LocalCluster(processes=False, **options))
+    return stack.enter_context(distributed.Client(cluster)).get_executor()
+
+
+def processes(way):
+    return lambda stack: ProcessPoolExecutor(2, mp_context=multiprocessing.get_context(way))
+
+
+@pytest.mark.nightly
 @pytest.mark.parametrize(
-    ("options", "match"),
+    "pool",
     [
-        ({"cutoff": 5.0, "filtered": False}, "filtered=False"),
-        ({"decimation": 0}, "decimation"),
-        ({"dead_band": [0.1, 0.2]}, "expected one velocity"),
-        ({"accuracy": 3}, "2, 4 or 6"),
+        lambda stack: Shuffled(stack.enter_context(ThreadPoolExecutor(1))),
+        lambda stack: Shuffled(stack.enter_context(ThreadPoolExecutor(3))),
+        processes("fork"),
+        processes("spawn"),  # it imports the package
+        dask,
     ],
 )
-def test_choices_that_make_no_sense_are_named(options, match):
-    with pytest.raises((InvalidValueError, ShapeError), match=match):
-        choose_processing(moved(10_000), **options)
+def test_the_number_of_workers_and_their_order_change_no_bit(pool):
+    whole = system()
+    with ExitStack() as stack:
+        executor = pool(stack)
+        found = reduce_equations(whole, executor, window=6)
+        executor.shutdown()
+    assert bits(found) == bits(reduce_equations(whole))
+
+
+@pytest.mark.nightly
+def test_the_factor_is_that_of_all_equations():
+    whole = system(decimation=7)
+    factors = reduce_equations(whole)
+    blocks = list(whole.blocks())
+    weights = np.array([1.0, 3.0])
+    R, y, rest = factors.stacked(weights)
+    rows = np.vstack([
+        w * np.column_stack((b.W[:, j], b.y[:, j]))[b.use[:, j]]
+        for j, w in enumerate(weights)
+        for b in blocks
+    ])  # fmt: skip
+    N = rows.T @ rows
+    found = np.zeros_like(N)
+    found[:-1, :-1], found[:-1, -1], found[-1, :-1] = R.T @ R, R.T @ y, R.T @ y
+    found[-1, -1] = y @ y + rest
+    size = np.sqrt(np.diag(N))
+    np.testing.assert_allclose(found / np.outer(size, size), N / np.outer(size, size), atol=1e-12)
+    assert factors.rows == len(rows)
+
+
+@pytest.mark.nightly
+def test_memory_is_that_of_a_piece_whatever_the_length():
+    whole = system()
+    peaks = []
+    for repeats in (2, 12):
+        logs = (whole.with_log(whole.log.rows(0, 40_000)) for _ in range(repeats))
+        tracemalloc.start()
+        reduce_equations(logs)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.02 * peaks[0]
+
+
+@pytest.mark.nightly
+def test_blocks_are_kept_as_far_as_memory_allows_of_their_log_and_choices_alone(monkeypatch):
+    whole = system(4).cached()
+    first = bits(reduce_equations(whole))
+    assert len(whole.cache.blocks) == len(whole.pieces())
+    assert next(whole.blocks()) is next(whole.blocks())
+    assert bits(reduce_equations(whole)) == first
+    fewer = whole.with_names(whole.names[1:])
+    assert bits(reduce_equations(fewer)) == bits(reduce_equations(fewer.uncached()))
+    log = whole.log
+    table = replace(whole.model.table, d=2.0 * whole.model.table.d)
+    base = base_parameters(whole.model.with_table(table), drive=whole.base.drive)
+    assert base.names == whole.names
+    others = {
+        "base": base,
+        "log": Log(log.dt, log.q, 2.0 * log.tau),
+        "form": EquationForm.POWER,
+        "processing": choose_processing(log, decimation=7),
+    }
+    for name, value in others.items():
+        other = replace(whole, **{name: value})
+        for kept, made in zip(other.blocks(), other.uncached().blocks(), strict=True):
+            assert np.array_equal(kept.W, made.W)
+            assert np.array_equal(kept.y, made.y)
+    assert pickle.loads(pickle.dumps(whole)).cache is None
+    monkeypatch.setattr(sys.modules["robotmodels.identification.equations"], "_KEPT_BYTES", 10**6)
+    some = system(4).cached()
+    assert bits(reduce_equations(some)) == first
+    assert 0 < some.cache.size <= 10**6
+    assert some.with_log(some.log.rows(0, 20_000)).cache is None

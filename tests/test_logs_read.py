@@ -12,8 +12,8 @@ from robotmodels.datasets import load_tx40
 from robotmodels.errors import InvalidValueError, MissingExtraError, ShapeError
 from robotmodels.logs import read_log
 
-N, n = 60, 3
-DT = 0.01
+N, n, DT = 60, 3, 0.01
+NUMBERED = ["t", *(f"q{j + 1}" for j in range(n)), *(f"tau{j + 1}" for j in range(n))]
 
 
 def samples(seed=0):
@@ -21,66 +21,81 @@ def samples(seed=0):
     return DT * np.arange(N), rng.normal(size=(N, n)), rng.normal(size=(N, n))
 
 
-def write(path, header, *columns, delimiter=","):
-    rows = np.column_stack(columns)
-    lines = [delimiter.join(repr(float(x)) for x in row) for row in rows]
+def columns(header, *blocks):
+    """Columns by name, as a mapping that `read_log` takes like a file."""
+    return dict(zip(header, np.column_stack(blocks).T, strict=True))
+
+
+def write(path, header, *blocks, delimiter=","):
+    lines = [delimiter.join(repr(float(x)) for x in row) for row in np.column_stack(blocks)]
     head = [delimiter.join(header)] if header else []
     path.write_text("\n".join([*head, *lines]) + "\n", encoding="utf-8")
     return path
-
-
-NUMBERED = ["t", *(f"q{j + 1}" for j in range(n)), *(f"tau{j + 1}" for j in range(n))]
-
-
-@pytest.fixture
-def file(tmp_path):
-    return write(tmp_path / "run.csv", NUMBERED, *samples())
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_any_table_of_numbers_is_read_as_it_is(tmp_path, seed):
-    # delimiters, shuffled columns, other columns, with and without a header, odd magnitudes
-    rng = np.random.default_rng(seed)
-    delimiter = [",", ";", "\t", " "][seed % 4]
-    joints = int(rng.integers(1, 8))
-    rows = int(rng.integers(2, 40))
-    columns = {"clock": np.arange(rows) * DT}
-    for j in range(joints):
-        columns[f"q{j}"] = rng.normal(size=rows) * 10.0 ** rng.integers(-12, 1)
-        columns[f"tau{j}"] = rng.normal(size=rows) * 10.0 ** rng.integers(-12, 13)
-    columns["other"] = rng.normal(size=rows)
-    order = rng.permutation(list(columns)).tolist()
-    header = order if rng.integers(2) else None
-    path = write(tmp_path / "x.txt", header, *(columns[key] for key in order), delimiter=delimiter)
-    given = (lambda key: key) if header else order.index
-    log = read_log(
-        path, positions=[given(f"q{j}") for j in range(joints)],
-        torques=[given(f"tau{j}") for j in range(joints)], time=given("clock"),
-    )  # fmt: skip
-    assert np.array_equal(log.q, np.column_stack([columns[f"q{j}"] for j in range(joints)]))
-    assert np.array_equal(log.tau, np.column_stack([columns[f"tau{j}"] for j in range(joints)]))
-    if header and rows > 1:
-        found = read_log(path, time="clock")
-        assert np.array_equal(found.q, log.q)
-        assert np.array_equal(found.tau, log.tau)
 
 
 def same(log, q, tau):
     return np.array_equal(log.q, q) and np.array_equal(log.tau, tau)
 
 
-def test_npz_round_trip_with_all_quantities(tmp_path):
-    t, q, tau = samples()
-    names = ("v", "a", "q_ref", "v_ref")
-    more = {name: np.random.default_rng(k).normal(size=(N, n)) for k, name in enumerate(names, 1)}
-    np.savez(tmp_path / "run.npz", t=t, q=q, tau=tau, unrelated=np.arange(4), **more)
-    log = read_log(tmp_path / "run.npz")
-    assert same(log, q, tau)
-    for name, values in more.items():
-        assert np.array_equal(getattr(log, name), values)
-    assert read_log(tmp_path / "run.npz", velocities=False).v is None
-    other = read_log(tmp_path / "run.npz", positions="q", torques="v", velocities=False)
-    assert np.array_equal(other.tau, more["v"])
+# --- formats -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_any_table_of_numbers_is_read_as_it_is(tmp_path, seed):
+    # delimiters, shuffled columns, other columns, with and without a header, odd magnitudes
+    rng = np.random.default_rng(seed)
+    delimiter, joints, rows = [",", ";", "\t", " "][seed], rng.integers(1, 8), rng.integers(2, 40)
+    q, tau = (rng.normal(size=(rows, joints)) * 10.0 ** rng.integers(-12, 9) for _ in range(2))
+    order = rng.permutation(2 * joints + 2)
+    names = [*(f"{kind}{j}" for kind in ("q", "tau") for j in range(joints)), "clock", "other"]
+    header = [names[k] for k in order] if seed % 2 else None
+    data = np.column_stack((q, tau, DT * np.arange(rows), rng.normal(size=rows)))[:, order]
+    path = write(tmp_path / "x.txt", header, data, delimiter=delimiter)
+    at = names if header else np.argsort(order).tolist()
+    choice = {"positions": at[:joints], "torques": at[joints:-2], "time": at[-2]}
+    assert same(read_log(path, **choice), q, tau)
+    if header:
+        assert same(read_log(path, time="clock"), q, tau)
+
+
+@pytest.mark.parametrize("suffix", ["csv", "npz", "mat", "parquet", "mapping"])
+def test_every_format_holds_every_quantity(tmp_path, monkeypatch, suffix):
+    t, *blocks = samples()
+    kinds = ("q", "tau", "v", "a", "q_ref", "v_ref")
+    blocks += [np.random.default_rng(k).normal(size=(N, n)) for k in range(4)]
+    header = ["t", *(f"{kind}{j}" for kind in kinds for j in range(n))]
+    path, arrays = tmp_path / f"run.{suffix}", {"t": t} | dict(zip(kinds, blocks, strict=True))
+    if suffix == "csv":
+        write(path, header, t, *blocks)
+    elif suffix == "npz":
+        np.savez(path, unrelated=np.arange(4), **arrays)
+    elif suffix == "mat":
+        savemat(path, arrays)
+    elif suffix == "parquet":
+        pa = pytest.importorskip("pyarrow")
+        import pyarrow.parquet as pq
+
+        flat = columns(header, t, *blocks) | {"on": [True] * N}
+        pq.write_table(pa.table(flat), path)
+        stamps = pa.array((t * 1e9).round().astype("int64")).cast(pa.timestamp("ns"))
+        lists = {"stamp": stamps, "name": [["a", "b", "c"]] * N, "position": blocks[0].tolist()}
+        ros = tmp_path / "ros.parquet"
+        pq.write_table(pa.table({**lists, "effort": blocks[1].tolist()}), ros)
+        log = read_log(ros, times="ns")
+        assert same(log, *blocks[:2])
+        assert log.names == ("a", "b", "c")
+        assert log.dt == pytest.approx(DT, rel=1e-9)
+    source = columns(header, t, *blocks) if suffix == "mapping" else path
+    log = read_log(source)
+    for kind, block in zip(kinds, blocks, strict=True):
+        assert np.array_equal(getattr(log, kind), block)
+    assert read_log(source, velocities=False).v is None
+    assert (log.sources[0].rows, len(log.sources[0].sha256)) == (N, 64)
+    if suffix == "parquet":
+        for module in ("pyarrow", "pyarrow.parquet"):
+            monkeypatch.setitem(sys.modules, module, None)
+        with pytest.raises(MissingExtraError, match=r"pip install 'robotmodels\[logs\]'"):
+            read_log(path)
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -99,44 +114,12 @@ def test_mat_files_and_structures_beside_other_arrays(tmp_path, turned):
     x, y = (q.T, tau.T) if turned else (q, tau)
     savemat(file, {"run": {"arm": {"q": x, "tau": y}, "time": t}, **other})
     asked = {"positions": "run.arm.q", "torques": "run.arm.tau", "time": "run.time"}
-    log = read_log(file, **asked)
-    assert same(log, q, tau)
-    assert log.dt == pytest.approx(DT)
+    assert same(read_log(file, **asked), q, tau)
     with pytest.raises(InvalidValueError, match=f"have {N}, {9 * N} samples; give times"):
         read_log(file, **asked | {"time": "table[0]"})
     # by their usual names, within a structure and beside arrays of other lengths
     savemat(file, {"log": {"q": x, "tau": y}, "time": t, **other})
     assert same(read_log(file), q, tau)
-
-
-def test_mappings_of_columns_are_read_like_files():
-    t, q, tau = samples()
-    columns = {"t": t} | {f"q{j}": x for j, x in enumerate(q.T)}
-    log = read_log(columns | {f"tau{j}": x for j, x in enumerate(tau.T)})
-    assert same(log, q, tau)
-    (source,) = log.sources
-    assert (source.name, source.rows, len(source.sha256)) == ("arrays", N, 64)
-
-
-def test_parquet_round_trip_with_columns_lists_and_stamps(tmp_path, monkeypatch):
-    pa = pytest.importorskip("pyarrow")
-    import pyarrow.parquet as pq
-
-    t, q, tau = samples()
-    flat = {f"q{j}": q[:, j] for j in range(n)} | {f"effort_{j}": tau[:, j] for j in range(n)}
-    pq.write_table(pa.table({"time": t, "on": [True] * N, **flat}), tmp_path / "flat.parquet")
-    assert same(read_log(tmp_path / "flat.parquet"), q, tau)
-    stamps = pa.array((t * 1e9).round().astype("int64")).cast(pa.timestamp("ns"))
-    lists = {"stamp": stamps, "name": [["a", "b", "c"]] * N, "position": q.tolist()}
-    pq.write_table(pa.table({**lists, "effort": tau.tolist()}), tmp_path / "ros.parquet")
-    log = read_log(tmp_path / "ros.parquet", times="ns")
-    assert same(log, q, tau)
-    assert log.names == ("a", "b", "c")
-    assert log.dt == pytest.approx(DT, rel=1e-9)
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
-    with pytest.raises(MissingExtraError, match=r"pip install 'robotmodels\[logs\]'"):
-        read_log(tmp_path / "flat.parquet")
 
 
 JOINTS = ("j1", "j2", "j3")
@@ -159,13 +142,13 @@ def ros_table(path, shape):
             for i, s in enumerate(stamps)
         ]  # fmt: skip
     elif shape == "plotjuggler":
-        head = [f"/joint_states/{j}/{k}" for k in ("effort", "position") for j in JOINTS]
+        head = ["__time"]
+        head += [f"/joint_states/{j}/{k}" for k in ("effort", "position") for j in JOINTS]
         rows = np.column_stack((t, tau, q)).tolist()
-        head = ["__time", *head]
     else:
-        head = [f"/joint_states/{k}[{j}]" for k in ("position", "effort") for j in range(n)]
+        head = ["__time"]
+        head += [f"/joint_states/{k}[{j}]" for k in ("position", "effort") for j in range(n)]
         rows = np.column_stack((t, q, tau)).tolist()
-        head = ["__time", *head]
     path.write_text("\n".join(",".join(map(str, row)) for row in [head, *rows]) + "\n")
     return path, q, tau
 
@@ -176,78 +159,25 @@ def test_tables_of_ros(tmp_path, shape):
     log = read_log(path)
     assert same(log, q, tau)
     assert log.dt == pytest.approx(DT, rel=1e-6)
-    assert len(log.starts) == 1
-    assert not log.refused
-    if shape != "plotjuggler arrays":
-        assert log.names == JOINTS
+    assert (len(log.starts), log.refused) == (1, ())
+    if shape == "plotjuggler arrays":
+        return
+    assert log.names == JOINTS
+    order = ["j3", "j1"] if shape == "rostopic" else ["j2", "j3", "j1"]
+    log, at = read_log(path, joints=order), [JOINTS.index(j) for j in order]
+    assert log.names == tuple(order)
+    assert same(log, q[:, at], tau[:, at])
+    with pytest.raises(InvalidValueError, match=r"expected j1, j2, j9; .*joints are j1, j2"):
+        read_log(path, joints=["j1", "j2", "j9"])
 
 
-def test_joints_of_ros_are_put_in_the_order_asked_for(tmp_path):
-    path, q, tau = ros_table(tmp_path / "ros.csv", "rostopic")
-    log = read_log(path, joints=["j3", "j1"])
-    assert log.names == ("j3", "j1")
-    assert same(log, q[:, [2, 0]], tau[:, [2, 0]])
-    other, q, _ = ros_table(tmp_path / "pj.csv", "plotjuggler")
-    assert np.array_equal(read_log(other, joints=["j2", "j3", "j1"]).q, q[:, [1, 2, 0]])
-    for name in (other, path):
-        with pytest.raises(InvalidValueError, match=r"expected j1, j2, j9; .*joints are j1, j2"):
-            read_log(name, joints=["j1", "j2", "j9"])
-
-
-def test_torques_whose_joints_stand_in_another_order_are_put_in_that_of_the_positions(tmp_path):
+def test_torques_whose_joints_stand_in_another_order_are_put_in_that_of_the_positions():
     t, q, tau = samples()
     order = [1, 2, 0]
     head = [f"position/{j}" for j in JOINTS] + [f"effort/{JOINTS[k]}" for k in order]
-    log = read_log(write(tmp_path / "log.csv", ["time", *head], t, q, tau[:, order]))
+    log = read_log(columns(["time", *head], t, q, tau[:, order]))
     assert log.names == JOINTS
     assert same(log, q, tau)
-
-
-def test_units_gears_signs_gains_and_offsets(file):
-    _, q, tau = samples()
-    log = read_log(
-        file, angles="deg", signs=[1, -1, 1], gears=[10.0, 20.0, -30.0], drive_gains=0.5,
-        offsets=[0.0, 0.1, 0.0],
-    )  # fmt: skip
-    expected = np.radians(q) * [1, -1, 1] / [10.0, 20.0, -30.0] + [0.0, 0.1, 0.0]
-    np.testing.assert_allclose(log.q, expected, rtol=1e-14, atol=1e-16)
-    np.testing.assert_allclose(log.tau, 0.5 * tau * [1, -1, 1] * [10.0, 20.0, -30.0], rtol=1e-14)
-
-
-def test_transmission_keeps_the_work_and_moves_references_with_its_zero(tmp_path):
-    t, q, tau = samples()
-    path = write(
-        tmp_path / "x.csv", [*NUMBERED, "dq1", "dq2", "dq3", "q_ref1", "q_ref2", "q_ref3"],
-        t, q, tau, q + 1.0, q + 2.0,
-    )  # fmt: skip
-    K = rm.Transmission([[0.5, 0, 0], [0.1, 0.2, 0], [0, 0, -1]], [0.3, 0.0, 0.0])
-    log = read_log(path, transmission=K)
-    np.testing.assert_allclose(log.q, K.to_joint(q))
-    np.testing.assert_allclose(log.tau @ K.matrix, tau)
-    np.testing.assert_allclose(log.v, (q + 1.0) @ K.matrix.T)
-    np.testing.assert_allclose(log.q_ref, K.to_joint(q + 2.0))
-    with pytest.raises(InvalidValueError, match="gears, transmission"):
-        read_log(path, transmission=K, gears=2.0)
-
-
-def test_lengths_are_of_prismatic_joints(file):
-    table = rm.DHTable(antecedent=[0, 1, 2], sigma=[0, 1, 0])
-    model = rm.RobotModel.from_table(table)
-    log = read_log(file, model=model, angles="deg", lengths="mm")
-    _, q, _ = samples()
-    np.testing.assert_allclose(log.q, q * [np.pi / 180, 1e-3, np.pi / 180])
-    assert log.names == model.table.joint_names
-
-
-@pytest.mark.parametrize(("unit", "factor"), [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)])
-def test_units_of_time(tmp_path, unit, factor):
-    t, q, tau = samples()
-    path = write(tmp_path / "a.csv", NUMBERED, t / factor, q, tau)
-    assert read_log(path, times=unit).dt == pytest.approx(DT)
-    header = write(tmp_path / "b.csv", [f"time [{unit}]", *NUMBERED[1:]], t / factor, q, tau)
-    assert read_log(header).dt == pytest.approx(DT)
-    with pytest.raises(InvalidValueError, match=f"header has times in '{unit}'"):
-        read_log(header, times="s" if unit == "ms" else "ms")
 
 
 @pytest.mark.parametrize(
@@ -259,31 +189,74 @@ def test_units_of_time(tmp_path, unit, factor):
         ("arm_{}_pos", "effort_arm_{}", "arm_{}_pos_ref"),
     ],
 )
-def test_usual_names_are_found(tmp_path, position, torque, reference):
+def test_usual_names_are_found(position, torque, reference):
     t, q, tau = samples()
     head = [name.format(j) for name in (reference, torque, position) for j in (1, 2, 3)]
-    path = write(tmp_path / "run.csv", [*head, "Time [ms]"], q + 1.0, tau, q, 1e3 * t)
+    table = columns([*head, "Time [ms]"], q + 1.0, tau, q, 1e3 * t)
     names = [f"arm_{j}" for j in (1, 2, 3)] if "arm" in position else None
-    log = read_log(path, drive_gains=1.0, joints=names)
+    log = read_log(table, drive_gains=1.0, joints=names)
     assert same(log, q, tau)
     assert np.array_equal(log.q_ref, q + 1.0)
     if names is not None:
-        turned = read_log(path, drive_gains=1.0, joints=names[::-1])
+        turned = read_log(table, drive_gains=1.0, joints=names[::-1])
         assert same(turned, q[:, ::-1], tau[:, ::-1])
     else:  # by patterns, in the order of their numbers
         stars = {"positions": position.format("*"), "torques": torque.format("*")}
-        assert same(read_log(path, time="Time [ms]", drive_gains=1.0, **stars), q, tau)
+        assert same(read_log(table, time="Time [ms]", drive_gains=1.0, **stars), q, tau)
+
+
+# --- units and sides -----------------------------------------------------------------------------
+
+
+def test_units_gears_signs_gains_and_offsets():
+    t, q, tau = samples()
+    table = columns(NUMBERED, t, q, tau)
+    log = read_log(
+        table, angles="deg", signs=[1, -1, 1], gears=[10.0, 20.0, -30.0], drive_gains=0.5,
+        offsets=[0.0, 0.1, 0.0],
+    )  # fmt: skip
+    expected = np.radians(q) * [1, -1, 1] / [10.0, 20.0, -30.0] + [0.0, 0.1, 0.0]
+    np.testing.assert_allclose(log.q, expected, rtol=1e-14, atol=1e-16)
+    np.testing.assert_allclose(log.tau, 0.5 * tau * [1, -1, 1] * [10.0, 20.0, -30.0], rtol=1e-14)
+    # lengths are of prismatic joints
+    model = rm.RobotModel.from_table(rm.DHTable(antecedent=[0, 1, 2], sigma=[0, 1, 0]))
+    log = read_log(table, model=model, angles="deg", lengths="mm")
+    np.testing.assert_allclose(log.q, q * [np.pi / 180, 1e-3, np.pi / 180])
+    assert log.names == model.table.joint_names
+
+
+def test_transmission_keeps_the_work_and_moves_references_with_its_zero():
+    t, q, tau = samples()
+    head = [*NUMBERED, "dq1", "dq2", "dq3", "q_ref1", "q_ref2", "q_ref3"]
+    table = columns(head, t, q, tau, q + 1.0, q + 2.0)
+    K = rm.Transmission([[0.5, 0, 0], [0.1, 0.2, 0], [0, 0, -1]], [0.3, 0.0, 0.0])
+    log = read_log(table, transmission=K)
+    np.testing.assert_allclose(log.q, K.to_joint(q))
+    np.testing.assert_allclose(log.tau @ K.matrix, tau)
+    np.testing.assert_allclose(log.v, (q + 1.0) @ K.matrix.T)
+    np.testing.assert_allclose(log.q_ref, K.to_joint(q + 2.0))
+    with pytest.raises(InvalidValueError, match="gears, transmission"):
+        read_log(table, transmission=K, gears=2.0)
 
 
 @pytest.mark.parametrize(
-    ("name", "factor"), [("time_ms", 1e3), ("t_us", 1e6), ("Timestamp_ns", 1e9), ("elapsed_sec", 1)]
-)
-def test_a_unit_at_the_end_of_the_name_of_the_time_is_its_unit(tmp_path, name, factor):
+    ("name", "factor"),
+    [("time [ms]", 1e3), ("time [us]", 1e6), ("t [ns]", 1e9), ("time_ms", 1e3), ("t_us", 1e6),
+     ("Timestamp_ns", 1e9), ("elapsed_sec", 1)],
+)  # fmt: skip
+def test_units_of_time(name, factor):
     t, q, tau = samples()
-    head = [f"{kind}{j}" for kind in ("q", "tau") for j in (1, 2, 3)]
-    path = write(tmp_path / "run.csv", [*head, name], q, tau, factor * t)
-    assert same(read_log(path), q, tau)
-    assert same(read_log(path, time=name), q, tau)
+    table = columns([name, *NUMBERED[1:]], factor * t, q, tau)
+    unit = {1: "s", 1e3: "ms", 1e6: "us", 1e9: "ns"}[factor]
+    for log in (read_log(table), read_log(table, time=name), read_log(table, times=unit)):
+        assert same(log, q, tau)
+        assert log.dt == pytest.approx(DT)
+    assert read_log(columns(NUMBERED, factor * t, q, tau), times=unit).dt == pytest.approx(DT)
+    with pytest.raises(InvalidValueError, match=f"header has times in '{unit}'"):
+        read_log(table, times="s" if unit == "ms" else "ms")
+
+
+# --- rows and files ------------------------------------------------------------------------------
 
 
 def test_rows_that_lack_a_number_are_listed_and_split_the_log(tmp_path):
@@ -292,29 +265,26 @@ def test_rows_that_lack_a_number_are_listed_and_split_the_log(tmp_path):
     (tmp_path / "a.csv").write_text("\n".join(lines))
     log = read_log(tmp_path / "a.csv")
     (refused,) = log.refused
-    assert refused.rows == (5, 10, 11)
-    assert refused.source == "a.csv"
+    assert (refused.rows, refused.source) == ((5, 10, 11), "a.csv")
     assert log.starts.tolist() == [0, 5, 9]
     assert log.q.ravel().tolist() == [*range(5), *range(6, 10), *range(12, 20)]
     assert any("3 of 20 rows were left out" in note for note in log.notes)
 
 
-def test_torques_of_another_file_by_time(tmp_path):
+def test_torques_of_another_file_by_time():
     t = np.arange(0.0, 2.0, DT)
     late = np.arange(0.1037, 1.9, 0.004)
     late = late[(late < 1.0) | (late > 1.1)]
-    a = write(tmp_path / "a.csv", ["t", "q1"], t, t)
-    b = write(tmp_path / "b.csv", ["t", "tau1"], late, np.sin(5.0 * late))
-    log = read_log(a, torques_from=b)
+    positions = {"t": t, "q1": t}
+    log = read_log(positions, torques_from={"t": late, "tau1": np.sin(5.0 * late)})
     np.testing.assert_allclose(log.tau, np.sin(5.0 * log.q), atol=1e-7)
     assert len(log.starts) == 2
     (refused,) = log.refused
     lost = t[list(refused.rows)]
     assert ((lost < 0.1037) | (lost > 1.89) | ((lost > 0.99) & (lost < 1.11))).all()
     assert len(log) + len(lost) == len(t)
-    c = write(tmp_path / "c.csv", ["t", "tau1"], late[::-1], late)
     with pytest.raises(InvalidValueError, match="go back or repeat"):
-        read_log(a, torques_from=c)
+        read_log(positions, torques_from={"t": late[::-1], "tau1": late})
 
 
 def test_several_files_are_several_recordings(tmp_path):
@@ -325,7 +295,7 @@ def test_several_files_are_several_recordings(tmp_path):
     assert [source.name for source in log.sources] == ["0.csv", "1.csv", "2.csv"]
     assert log.sources[0].sha256 == hashlib.sha256(files[0].read_bytes()).hexdigest()
     assert np.array_equal(log.q[N : 2 * N], q + 1)
-    slower = write(tmp_path / "slow.csv", NUMBERED, 2 * t, q, tau)
+    slower = columns(NUMBERED, 2 * t, q, tau)
     with pytest.raises(InvalidValueError, match=r"number 1 is sampled every 0\.02 s.*dt="):
         read_log([files[0], slower])
     assert len(read_log([files[0], slower], dt=DT)) == N + 2 * N - 1
@@ -333,8 +303,7 @@ def test_several_files_are_several_recordings(tmp_path):
 
 def test_the_tx40_is_read_from_two_files_by_row(tmp_path):
     data = load_tx40()
-    rows = slice(0, 200)
-    head = [f"Joint_{j}" for j in range(1, 7)]
+    rows, head = slice(0, 200), [f"Joint_{j}" for j in range(1, 7)]
     a = write(tmp_path / "pos.csv", head, data.motor_positions[rows])
     b = write(tmp_path / "curr.csv", head, data.motor_torques[rows])
     given = {"torques_from": b, "dt": 2e-4, "model": data.model}
@@ -349,49 +318,39 @@ def test_the_tx40_is_read_from_two_files_by_row(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("head", "given", "words"),
     [
-        ({"positions": "q*", "torques": "q*"}, "q1 of .* would be positions and torques at once"),
-        ({"positions": ["t", "q1", "q2"]}, "t of .* would be time and positions at once"),
-        ({"positions": ["q1", "q2", "nope"]}, "no column 'nope'. Its columns: t"),
-        ({"positions": [1, 2]}, "3 columns.*for 2 columns of positions"),
-        ({"signs": [1, 2, 1]}, "expected 1 or -1"),
-        ({"gears": [1.0, 0.0, 1.0]}, "other than zero"),
-        ({"dt": -1.0}, "dt: expected a finite number"),
-        ({"joints": ["a"]}, "3 columns.*but 1 joints"),
-        ({"time": False}, "no column of times"),
+        ({}, {"positions": "q*", "torques": "q*"}, "q1 of .* would be positions and torques at"),
+        ({}, {"positions": ["t", "q1", "q2"]}, "t of .* would be time and positions at once"),
+        ({}, {"positions": ["q1", "q2", "nope"]}, "no column 'nope'. Its columns: t"),
+        ({}, {"positions": [1, 2]}, "3 columns.*for 2 columns of positions"),
+        ({}, {"signs": [1, 2, 1]}, "expected 1 or -1"),
+        ({}, {"gears": [1.0, 0.0, 1.0]}, "other than zero"),
+        ({}, {"dt": -1.0}, "dt: expected a finite number"),
+        ({}, {"joints": ["a"]}, "3 columns.*but 1 joints"),
+        ({}, {"time": False}, "no column of times"),
+        ({1: "u", 2: "w", 3: "x"}, {}, "positions: no columns of .*usual name"),
+        ({3: "q4"}, {}, "without gaps"),
+        ({1: "a.q1", 2: "b.q1", 3: "q2"}, {}, "several candidates"),
+        ({4: "current1", 5: "current2", 6: "current3"}, {}, "has currents .* give drive_gains="),
+        ({1: "q1 [deg]"}, {}, "'deg', the argument is angles="),
+        ({1: "q1 [rev]"}, {}, "'rev', the argument is angles='rad'; expected"),
+        ({4: "tau1 (lbf-ft)"}, {}, "not in N m; give drive_gains="),
+        ({4: "tau1 (N*m)"}, {}, None),
     ],
 )
-def test_arguments_that_do_not_fit_are_refused(file, given, words):
-    with pytest.raises((InvalidValueError, ShapeError), match=words):
-        read_log(file, **given)
-
-
-@pytest.mark.parametrize(
-    ("head", "words"),
-    [
-        (["t", "u", "w", "x", *NUMBERED[4:]], "positions: no columns of .*usual name"),
-        (["t", "q1", "q2", "q4", *NUMBERED[4:]], "without gaps"),
-        (["t", "a.q1", "b.q1", "q2", *NUMBERED[4:]], "several candidates"),
-        ([*NUMBERED[:4], "current1", "current2", "current3"], "has currents .* give drive_gains="),
-        (["t", *(f"q{j} [deg]" for j in "123"), *NUMBERED[4:]], "'deg', the argument is angles="),
-        (
-            ["t", *(f"q{j} [rev]" for j in "123"), *NUMBERED[4:]],
-            "'rev', the argument is angles='rad'; expected",
-        ),
-        ([*NUMBERED[:4], *(f"tau{j} (lbf-ft)" for j in "123")], "not in N m; give drive_gains="),
-        ([*NUMBERED[:4], *(f"tau{j} (N*m)" for j in "123")], None),
-    ],
-)
-def test_headers_that_cannot_be_read_are_refused(tmp_path, head, words):
+def test_columns_and_arguments_that_do_not_fit_are_refused(tmp_path, head, given, words):
     t, q, tau = samples()
-    path = write(tmp_path / "odd.csv", head, t, q, tau)
-    if words is not None:
-        with pytest.raises(InvalidValueError, match=words):
-            read_log(path)
-        path = write(tmp_path / "bare.csv", None, t, q, tau)
-    given = {"time": 0, "positions": [1, 2, 3], "torques": [4, 5, 6]}
-    assert same(read_log(path, **given), q, tau)
+    header = [head.get(k, name) for k, name in enumerate(NUMBERED)]
+    table = columns(header, t, q, tau)
+    if words is None:
+        assert same(read_log(table), q, tau)
+        return
+    with pytest.raises((InvalidValueError, ShapeError), match=words):
+        read_log(table, **given)
+    if head:
+        bare = write(tmp_path / "bare.csv", None, t, q, tau)
+        assert same(read_log(bare, time=0, positions=[1, 2, 3], torques=[4, 5, 6]), q, tau)
 
 
 @pytest.mark.parametrize(
@@ -406,10 +365,8 @@ def test_headers_that_cannot_be_read_are_refused(tmp_path, head, words):
 )
 def test_damaged_and_missing_files_are_refused(tmp_path, name, data, words):
     (tmp_path / name).write_bytes(data)
-    with pytest.raises(InvalidValueError, match=words):
-        read_log(tmp_path / name)
-    for path, words in ((tmp_path, "is a folder"), ([], "got none")):
-        with pytest.raises(InvalidValueError, match=words):
+    for path, said in ((tmp_path / name, words), (tmp_path, "is a folder"), ([], "got none")):
+        with pytest.raises(InvalidValueError, match=said):
             read_log(path)
     with pytest.raises(FileNotFoundError, match=rf"there is no such file.*{name}"):
         read_log(tmp_path / f"x{name}")
