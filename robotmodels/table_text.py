@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from math import pi
 from typing import NamedTuple
@@ -37,18 +37,20 @@ def joints_text(columns: Mapping[str, Iterable[float]]) -> str:
     return boxed([("j", [str(j + 1) for j in range(len(cells[0][1]))]), *cells])
 
 
-def angle_text(value: float) -> str:
-    """An angle as a fraction of pi if it is one to rounding, else in radians."""
-    ratio = Fraction(value / pi).limit_denominator(12)
-    if value and abs(float(ratio) * pi - value) < 1e-12 and ratio:
-        top = {1: "π", -1: "-π"}.get(ratio.numerator, f"{ratio.numerator}π")
-        return top if ratio.denominator == 1 else f"{top}/{ratio.denominator}"
-    return length_text(value)
-
-
 def length_text(value: float) -> str:
     """A number with six significant digits and no needless zeros; below 1e-9 it shows as 0."""
     return f"{value:.6g}" if abs(value) >= SMALLEST else "0"
+
+
+def angle_text(
+    value: float, within: float = 1e-12, number: Callable[[float], str] = length_text
+) -> str:
+    """An angle as a fraction of pi if it is one to rounding, else in radians."""
+    ratio = Fraction(value / pi).limit_denominator(12)
+    if value and abs(float(ratio) * pi - value) < within and ratio:
+        top = {1: "π", -1: "-π"}.get(ratio.numerator, f"{ratio.numerator}π")
+        return top if ratio.denominator == 1 else f"{top}/{ratio.denominator}"
+    return number(value)
 
 
 def variable_text(symbol: str, number: int, offset: str, negative: bool) -> str:

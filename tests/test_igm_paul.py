@@ -7,18 +7,15 @@ from math import acos, atan2, cos, hypot, pi, sin, sqrt
 
 import numpy as np
 import pytest
+from matplotlib.mathtext import MathTextParser
 from numba import types as nb
 
 import robotmodels as rm
 from robotmodels import se3
 from robotmodels.errors import InvalidValueError
-from robotmodels.igm.chain import VirtualJoint, locked_chain, with_virtual_joints
 from robotmodels.igm.loop import joint_chain
-from robotmodels.igm.motion import tool_poses
 from robotmodels.igm.paul import derive_plan, explain_igm, layout
 from robotmodels.igm.paul._types import solve, solve_rare
-from robotmodels.igm.paul.types import EquationType
-from robotmodels.igm.paul.typeset import type_formula
 from robotmodels.kernels._compile import compiled
 
 COMPLETE = (
@@ -27,138 +24,7 @@ COMPLETE = (
     "irb140", "irb6640", "xarm5",
 )  # fmt: skip
 RIGHT = pi / 2
-
-
-@cache
-def plan_of(name):
-    return derive_plan(joint_chain(rm.load(name)))
-
-
-@cache
-def told_of(name):
-    return explain_igm(rm.load(name))
-
-
-def rotations(rng):
-    Q, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-    return Q * np.sign(np.linalg.det(Q))
-
-
-def random_pose(rng):
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = rotations(rng), rng.uniform(-1, 1, 3)
-    return T
-
-
-def postures_at_random(plan, count, seed=0):
-    q = np.random.default_rng(seed).uniform(-pi, pi, (count, plan.form.k))
-    q[:, plan.form.sigma == 1] *= 0.2
-    return q
-
-
-def poses_of(model, plan, q):
-    """Poses of the tool in R_0, by the direct model."""
-    full = np.zeros((len(q), model.n))
-    full[:, plan.chain.columns] = q
-    return se3.inverse(model.base) @ rm.dgm(model, full)
-
-
-def short(plan, way):
-    return np.where(plan.form.sigma == 0, (way + pi) % (2 * pi) - pi, way)
-
-
-def solved(plan, U, references=None):
-    """Rows of the plan alone: joints (NaN where there is none) and what the kernel reports."""
-    wanted = np.zeros((len(U), plan.form.k)) if references is None else references
-    q, residual, marks = plan.program.run(plan.program.numbers, U, wanted)
-    there = np.arange(q.shape[1]) < marks[:, :1]
-    assert np.where(there, residual, 0.0).max() <= 1e-9
-    return np.where(there[..., None], q, np.nan), marks
-
-
-def checked(model, plan, q):
-    """Solve the poses of q: every solution meets its pose; distance of the nearest one to q."""
-    U = poses_of(model, plan, q)
-    rows, marks = solved(plan, U)
-    N, S, k = rows.shape
-    valid = np.isfinite(rows[..., 0])
-    reached = poses_of(model, plan, np.where(valid[..., None], rows, 0.0).reshape(-1, k))
-    missing = np.abs(reached.reshape(N, S, 4, 4) - U[:, None]).max(axis=(2, 3))
-    reliable = marks[:, 1] == 0
-    assert np.where(valid & reliable[:, None], missing, 0.0).max() <= 2e-12
-    turning = rows[valid][:, plan.form.sigma == 0]
-    assert ((turning > -pi) & (turning <= pi)).all()
-    gap = np.abs(short(plan, rows - q[:, None])).max(axis=2)
-    return np.where(valid, gap, np.inf).min(axis=1), reliable, valid.sum(axis=1)
-
-
-# the plans
-
-
-@pytest.mark.parametrize(
-    ("name", "types"),
-    [
-        ("rx90", ["TYPE_2_ZERO", "TYPE_6", "TYPE_2_ZERO", "TYPE_3_DIRECT", "TYPE_3_DIRECT"]),
-        ("puma560", ["TYPE_2", "TYPE_7", "TYPE_2_ZERO", "TYPE_3_DIRECT", "TYPE_3_DIRECT"]),
-        ("ur5", ["TYPE_2", "TYPE_2_ZERO", "TYPE_3_DIRECT", "TYPE_3_DIRECT", "TYPE_8"]),
-        ("stanford_arm", ["TYPE_2", "TYPE_2_ZERO", "TYPE_1", "TYPE_2_ZERO", "TYPE_3_DIRECT",
-                          "TYPE_3_DIRECT"]),
-        ("gantry", ["TYPE_1"] * 3 + ["TYPE_2_ZERO", "TYPE_3_DIRECT", "TYPE_3_DIRECT"]),
-        ("lab_rr", ["TYPE_2_ZERO", "TYPE_3_DIRECT"]),
-        ("lab_rrt", ["TYPE_2_ZERO", "TYPE_2_ZERO", "TYPE_1"]),
-        ("lab_trr", ["TYPE_1", "TYPE_3_DIRECT", "TYPE_3_DIRECT"]),
-    ],
-)  # fmt: skip
-def test_types_of_known_arms(name, types):
-    plan = plan_of(name)
-    assert [step.type.name for step in plan.steps] == types
-    assert plan.complete
-    assert sorted(plan.solved) == list(range(plan.form.k))
-
-
-# postures
-
-
-@pytest.mark.parametrize("name", COMPLETE)
-def test_every_posture_meets_its_pose_and_the_generating_one_is_found(name):
-    plan, model = plan_of(name), rm.load(name)
-    gap, reliable, count = checked(model, plan, postures_at_random(plan, 300))
-    assert gap[reliable].max() < 1e-8
-    assert reliable.mean() > 0.99
-    if plan.form.k == 6:
-        assert (count[reliable] % 2 == 0).all()
-
-
-def test_chains_with_locked_and_with_virtual_joints_have_plans():
-    model = rm.load("rx90")
-    chain = joint_chain(model)
-    five = locked_chain(chain, {3: 0.0})
-    plan = derive_plan(five)
-    assert plan.complete
-    q = postures_at_random(plan, 50)
-    rows, _ = solved(plan, tool_poses(five, q))
-    assert np.nanmin(np.abs(short(plan, rows - q[:, None])).max(axis=2), axis=1).max() < 1e-8
-    arm = joint_chain(rm.load("lab_rrt"))
-    frame = se3.from_rpy([0.3, 0.2, 0.1])
-    longer, _ = with_virtual_joints(arm, [VirtualJoint(3, frame, 0)])
-    assert derive_plan(longer).complete
-
-
-def arm_of(rows, rng, rotated):
-    table = rm.DHTable.from_rows(rows)
-    base = random_pose(rng) if rotated else None
-    tool = random_pose(rng) if rotated else se3.translation(0.2, 0, 0.1)
-    return rm.RobotModel.from_table(table, base=base, tool=tool)
-
-
-def rows_of(kinds, twists, lengths, offsets):
-    rows = []
-    for kind, alpha, (d, r), theta in zip(kinds, twists, lengths, offsets, strict=True):
-        rows.append({"sigma": int(kind == "P"), "alpha": alpha, "d": d, "r": r, "theta": theta})
-    return rows
-
-
-THREE = {
+SHORT = {
     "planar RRR": ("RRR", (0, 0, 0)),
     "planar RPR": ("RPR", (0, RIGHT, -RIGHT)),
     "planar PRR": ("PRR", (0, RIGHT, 0)),
@@ -178,25 +44,123 @@ THREE = {
     "two slides": ("PP", (0, 1.0)),
     "five": ("RRRRR", (0, RIGHT, 0, 0, RIGHT)),
 }
+WRIST = ({"alpha": -RIGHT, "r": 0.4}, {"alpha": RIGHT}, {"alpha": -RIGHT})
+TURNED_ROUND = [{}, {"alpha": RIGHT}, {"alpha": -RIGHT, "r": -0.45}, {"alpha": RIGHT},
+                {"d": -0.45}, {"alpha": -RIGHT}]  # fmt: skip
+"""The RX-90 fixed by its flange: a spherical shoulder, solved on inverted equations."""
+
+
+@cache
+def model_of(name):
+    """A robot by name, a short arm with random lengths, or one with every other length zero."""
+    if name in COMPLETE or name[:4] == "erd:":
+        return rm.load(name)
+    if name == "turned round":
+        return rm.RobotModel.from_table(rm.DHTable.from_rows(TURNED_ROUND))
+    rng = np.random.default_rng(sum(map(ord, name)))
+    sparse = name.startswith("sparse ")
+    kinds, twists = SHORT[name.removeprefix("sparse ")]
+    k = len(kinds)
+    lengths = rng.uniform(0.1, 0.5, (k, 2)) * (rng.random((k, 2)) < (0.6 if sparse else 1.0))
+    lengths[1:, 0] = np.where(lengths[1:, 0] == 0, 0.3, lengths[1:, 0])
+    return arm_of(kinds, twists, lengths, rng, () if sparse else None)
+
+
+def arm_of(kinds, twists, lengths, rng, base=None, wrist=()):
+    """An arm between random transformations; ``base=()`` for none before it."""
+    rows = [
+        {"sigma": int(kind == "P"), "alpha": alpha, "d": d, "r": r, "theta": rng.uniform(-1, 1)}
+        for kind, alpha, (d, r) in zip(kinds, twists, lengths, strict=True)
+    ]
+    ends = [se3.from_rpy(rng.uniform(-1, 1, 3), rng.uniform(-1, 1, 3)) for _ in range(2)]
+    base, tool = ends if base is None else (None, se3.translation(0.2, 0, 0.1))
+    return rm.RobotModel.from_table(rm.DHTable.from_rows([*rows, *wrist]), base=base, tool=tool)
+
+
+@cache
+def plan_of(name):
+    return derive_plan(joint_chain(model_of(name)))
+
+
+@cache
+def explained(name):
+    return explain_igm(model_of(name))
+
+
+def postures_at_random(plan, count, seed=0):
+    q = np.random.default_rng(seed).uniform(-pi, pi, (count, plan.form.k))
+    q[:, plan.form.sigma == 1] *= 0.2
+    return q
+
+
+def poses_of(model, plan, q):
+    """Poses of the tool in R_0, by the direct model."""
+    full = np.zeros((len(q), model.n))
+    full[:, plan.chain.columns] = q
+    return se3.inverse(model.base) @ rm.dgm(model, full)
+
+
+def solved(plan, U):
+    """Rows of the plan alone: joints (NaN where there is none) and what the kernel reports."""
+    q, residual, marks = plan.program.run(plan.program.numbers, U, np.zeros((len(U), plan.form.k)))
+    there = np.arange(q.shape[1]) < marks[:, :1]
+    assert np.where(there, residual, 0.0).max() <= 1e-9
+    return np.where(there[..., None], q, np.nan), marks
+
+
+def check(model, plan, q, within):
+    """Every solution meets its pose, and the posture that made the pose is among them."""
+    U = poses_of(model, plan, q)
+    rows, marks = solved(plan, U)
+    valid, reliable = np.isfinite(rows[..., 0]), marks[:, 1] == 0
+    i, _ = np.nonzero(valid & reliable[:, None])
+    found = rows[valid & reliable[:, None]]
+    np.testing.assert_allclose(poses_of(model, plan, found), U[i], rtol=0, atol=2e-12)
+    turning = plan.form.sigma == 0
+    assert ((found[:, turning] > -pi) & (found[:, turning] <= pi)).all()
+    way = rows - q[:, None]
+    gap = np.abs(np.where(turning, (way + pi) % (2 * pi) - pi, way)).max(axis=2)
+    assert np.nanmin(gap[reliable], axis=1).max() < within
+    return reliable, valid.sum(axis=1)[reliable]
+
+
+# the plans and their postures
+
+
+@pytest.mark.parametrize(
+    ("name", "types"),
+    [
+        ("rx90", ["TYPE_2_ZERO", "TYPE_6", "TYPE_2_ZERO", "TYPE_3_DIRECT", "TYPE_3_DIRECT"]),
+        ("puma560", ["TYPE_2", "TYPE_7", "TYPE_2_ZERO", "TYPE_3_DIRECT", "TYPE_3_DIRECT"]),
+        ("ur5", ["TYPE_2", "TYPE_2_ZERO", "TYPE_3_DIRECT", "TYPE_3_DIRECT", "TYPE_8"]),
+        ("stanford_arm", ["TYPE_2", "TYPE_2_ZERO", "TYPE_1", "TYPE_2_ZERO", "TYPE_3_DIRECT",
+                          "TYPE_3_DIRECT"]),
+        ("gantry", ["TYPE_1"] * 3 + ["TYPE_2_ZERO", "TYPE_3_DIRECT", "TYPE_3_DIRECT"]),
+        ("lab_rr", ["TYPE_2_ZERO", "TYPE_3_DIRECT"]),
+        ("lab_rrt", ["TYPE_2_ZERO", "TYPE_2_ZERO", "TYPE_1"]),
+        ("lab_trr", ["TYPE_1", "TYPE_3_DIRECT", "TYPE_3_DIRECT"]),
+    ],
+)  # fmt: skip
+def test_types_of_known_arms(name, types):
+    assert [step.type.name for step in plan_of(name).steps] == types
+
+
+@pytest.mark.parametrize("name", [*COMPLETE, "turned round"])
+def test_every_posture_meets_its_pose_and_the_generating_one_is_found(name):
+    plan = plan_of(name)
+    assert plan.complete
+    assert sorted(plan.solved) == list(range(plan.form.k))
+    reliable, count = check(model_of(name), plan, postures_at_random(plan, 300), 1e-8)
+    assert reliable.mean() > 0.99
+    assert plan.form.k < 6 or (count % 2 == 0).all()
 
 
 @pytest.mark.sampled(12)
-@pytest.mark.parametrize("name", THREE)
-@pytest.mark.parametrize("rotated", [False, True])
-def test_short_arms_of_every_kind(name, rotated):
-    rng = np.random.default_rng(sum(map(ord, name)))
-    kinds, twists = THREE[name]
-    k = len(kinds)
-    lengths = rng.uniform(0.1, 0.5, (k, 2)) * (rng.random((k, 2)) < (1.0 if rotated else 0.6))
-    lengths[1:, 0] = np.where(lengths[1:, 0] == 0, 0.3, lengths[1:, 0])
-    arm = arm_of(rows_of(kinds, twists, lengths, rng.uniform(-1, 1, k)), rng, rotated)
-    plan = derive_plan(joint_chain(arm))
+@pytest.mark.parametrize("name", [p + name for name in SHORT for p in ("", "sparse ")])
+def test_short_arms_of_every_kind(name):
+    plan = plan_of(name)
     assert plan.complete
-    gap, reliable, _ = checked(arm, plan, postures_at_random(plan, 60, seed=1))
-    assert gap[reliable].max() < 1e-6
-
-
-WRIST = ({"alpha": -RIGHT, "r": 0.4}, {"alpha": RIGHT}, {"alpha": -RIGHT})
+    check(model_of(name), plan, postures_at_random(plan, 60, seed=1), 1e-6)
 
 
 @pytest.mark.sampled(3)
@@ -206,72 +170,32 @@ def test_six_joint_arms_with_a_wrist(kinds):
     done = 0
     every = list(product((0.0, RIGHT, -RIGHT), repeat=2))
     for twists in (every[i] for i in rng.permutation(9)[:4]):
-        lengths = rng.uniform(0.1, 0.5, (3, 2))
-        rows = rows_of(kinds, (0.0, *twists), lengths, rng.uniform(-1, 1, 3))
-        arm = arm_of([*rows, *WRIST], rng, rotated=True)
+        arm = arm_of(kinds, (0.0, *twists), rng.uniform(0.1, 0.5, (3, 2)), rng, wrist=WRIST)
         q = np.random.default_rng(2).uniform(-2, 2, (40, 6))
         q[:, arm.table.sigma == 1] *= 0.3
-        if np.median(np.linalg.svd(rm.jacobian(arm, q), compute_uv=False)[:, -1]) < 1e-6:
-            continue  # two slides in line: redundant
         plan = derive_plan(joint_chain(arm))
-        if not plan.complete:
-            continue  # needs Pieper's quartic
-        done += 1
-        gap, reliable, _ = checked(arm, plan, q)
-        assert gap[reliable].max() < 1e-7
+        # two slides in line are redundant, other arms need Pieper's quartic
+        s = np.linalg.svd(rm.jacobian(arm, q), compute_uv=False)[:, -1]
+        if plan.complete and np.median(s) > 1e-6:
+            done += 1
+            check(arm, plan, q, 1e-7)
     assert done > 0
-
-
-def test_an_arm_turned_round_has_the_same_postures_backwards():
-    """The RX-90 fixed by its flange: a spherical shoulder, solved on inverted equations."""
-    plan, model = plan_of("rx90"), rm.load("rx90")
-    rows = [{}, {"alpha": RIGHT}, {"alpha": -RIGHT, "r": -0.45}, {"alpha": RIGHT}, {"d": -0.45},
-            {"alpha": -RIGHT}]  # fmt: skip
-    arm = rm.RobotModel.from_table(rm.DHTable.from_rows(rows))
-    U = poses_of(model, plan, postures_at_random(plan, 100))
-    backwards = derive_plan(joint_chain(arm))
-    assert backwards.complete
-    (ours, mine), (theirs, marks) = solved(backwards, se3.inverse(U)), solved(plan, U)
-    assert (mine[:, 0] == marks[:, 0]).all()
-    for a, b in zip(ours, theirs, strict=True):
-        gap = np.abs(short(plan, a[:, None] + b[:, ::-1])).max(axis=2)
-        assert np.nanmax(np.nanmin(gap[: np.isfinite(a[:, 0]).sum()], axis=1)) < 1e-9
-
-
-@pytest.mark.parametrize("name", ["rx90", "puma560", "stanford_arm"])
-@pytest.mark.parametrize("wrist", [0.0, 1e-12, 1e-7, 1e-3])
-def test_an_aligned_wrist_is_reported_and_loses_no_branch(name, wrist):
-    plan, model = plan_of(name), rm.load(name)
-    q = postures_at_random(plan, 80, seed=3)
-    q[:, 4] = 1.0 - plan.form.rows[4].offset
-    q = q[np.linalg.svd(rm.jacobian(model, q), compute_uv=False)[:, -1] > 0.05]
-    regular = solved(plan, poses_of(model, plan, q))[1][:, 0]
-    q[:, 4] = wrist - plan.form.rows[4].offset
-    _, marks = solved(plan, poses_of(model, plan, q), q)
-    assert (marks[:, 1] != 0).all() == (wrist < 1e-6)
-    if wrist > 1e-9:
-        assert (marks[:, 0] == regular).all()
 
 
 @pytest.mark.parametrize("off", [se3.from_rpy([0.1, 0.0, 0.0]), se3.translation(0.0, 0.0, 0.01)])
 def test_candidates_that_miss_the_pose_are_not_returned(off):
-    plan, model = plan_of("lab_trr"), rm.load("lab_trr")
-    U = poses_of(model, plan, postures_at_random(plan, 20)) @ off
+    plan = plan_of("lab_trr")
+    U = poses_of(model_of("lab_trr"), plan, postures_at_random(plan, 20)) @ off
     assert (solved(plan, U)[1][:, 0] == 0).all()
 
 
 def test_structure_within_rounding_is_used_and_the_true_table_is_met():
-    model = rm.load("puma560")
-    rng = np.random.default_rng(4)
-    table = model.table
-    rough = table.replace(
-        alpha=table.alpha + rng.uniform(-5e-10, 5e-10, 6), d=table.d + rng.uniform(-5e-10, 5e-10, 6)
-    )
-    arm = model.with_table(rough)
+    table, rng = rm.load("puma560").table, np.random.default_rng(4)
+    alpha, d = (x + rng.uniform(-5e-10, 5e-10, 6) for x in (table.alpha, table.d))
+    arm = rm.load("puma560").with_table(table.replace(alpha=alpha, d=d))
     plan = derive_plan(joint_chain(arm))
     assert [s.type for s in plan.steps] == [s.type for s in plan_of("puma560").steps]
-    q = postures_at_random(plan, 40)
-    found = rm.igm(arm, rm.dgm(arm, q))
+    found = rm.igm(arm, rm.dgm(arm, postures_at_random(plan, 40)))
     assert (found.count == 8).all()
     assert found.residual.max() < 1e-12
 
@@ -286,8 +210,7 @@ def scalar_solutions(code, g):
     if code == layout.OPPOSITE_ANGLES:
         return [(atan2(g[0], g[1]),), (atan2(-g[0], -g[1]),)]
     if code == layout.ONE_EQUATION:
-        X, Y, Z = g
-        middle, half = atan2(X, Y), acos(Z / hypot(X, Y))
+        middle, half = atan2(g[0], g[1]), acos(g[2] / hypot(g[0], g[1]))
         return [(middle + half,), (middle - half,)]
     if code == layout.TWO_EQUATIONS:
         S, C = np.linalg.solve([[g[0], g[1]], [g[3], g[4]]], [g[2], g[5]])
@@ -309,12 +232,12 @@ def scalar_solutions(code, g):
         r = hypot(g[1] / g[0], g[3] / g[2])
         return [(e * r, atan2(e * g[1] / g[0], e * g[3] / g[2])) for e in (1, -1)]
     if code == layout.LENGTH_AND_ANGLE:
-        X1, Y1, Z1, X2, Y2, Z2 = g
+        X1, Y1, Z1, X2, Y2, Z2 = g[:6]
         square = np.poly1d([Z1 / X1, Y1 / X1]) ** 2 + np.poly1d([Z2 / X2, Y2 / X2]) ** 2
         roots = (square - 1).roots
         return [(r, atan2((Y1 + Z1 * r) / X1, (Y2 + Z2 * r) / X2)) for r in roots]
     if code == layout.POLYNOMIAL:
-        return [(r.real,) for r in np.roots(g[::-1]) if abs(r.imag) < 1e-9]
+        return [(r.real,) for r in np.roots(g[4::-1]) if abs(r.imag) < 1e-9]
     z = np.roots([g[3] - 1j * g[4], g[1] - 1j * g[2], 2 * g[0], g[1] + 1j * g[2], g[3] + 1j * g[4]])
     return [(np.angle(x),) for x in z if abs(abs(x) - 1) < 1e-9]
 
@@ -332,9 +255,7 @@ def solve_alone(code, g, found, result):
 def solutions(code, g):
     """Values of both unknowns as the kernel gives them, and its flags."""
     found, result = np.zeros((24, 1)), np.zeros(2, np.int64)
-    padded = np.zeros(7)
-    padded[: len(g)] = g
-    solve_alone(code, padded, found, result)
+    solve_alone(code, np.concatenate([g, np.zeros(7 - len(g))]), found, result)
     rows = found.reshape(4, 2, 3)[: result[0]]
     angles = np.arctan2(rows[..., 2], rows[..., 1])
     if code >= layout.LENGTH:
@@ -343,33 +264,24 @@ def solutions(code, g):
 
 
 def coefficients(code, rng):
-    """Coefficients of an equation that has solutions."""
+    """Coefficients of an equation that has solutions: some of them follow from the others."""
     g, i, j, r = rng.normal(size=7), *rng.uniform(-3, 3, 3)
+    S, C = sin(i), cos(i)
     if code == layout.ONE_EQUATION:
-        return [g[0], g[1], g[0] * sin(i) + g[1] * cos(i)]
-    if code == layout.TWO_EQUATIONS:
-        return [
-            g[0],
-            g[1],
-            g[0] * sin(i) + g[1] * cos(i),
-            g[3],
-            g[4],
-            g[3] * sin(i) + g[4] * cos(i),
-        ]
-    if code == layout.TWO_ANGLES:
-        W1, W2, X, Y, sense = *g[:4], rng.choice((-1.0, 1.0))
-        Z1 = W1 * cos(j) + W2 * sin(j) - X * cos(i) - Y * sin(i)
-        Z2 = sense * (W1 * sin(j) - W2 * cos(j)) - X * sin(i) + Y * cos(i)
-        return [W1, W2, X, Y, Z1, Z2, sense]
-    if code == layout.LENGTH_AND_ANGLE:
-        X1, Z1, X2, Z2 = g[:4]
-        return [X1, X1 * sin(j) - Z1 * r, Z1, X2, X2 * cos(j) - Z2 * r, Z2]
-    if code == layout.QUARTIC:
-        g[0] = -(g[1] * cos(i) + g[2] * sin(i) + g[3] * cos(2 * i) + g[4] * sin(2 * i))
-        return g[:5]
-    if code == layout.POLYNOMIAL:
-        return rng.uniform(0.5, 2) * np.poly(np.arange(-1.5, 2.0) + 0.3 * rng.random(4))[::-1]
-    return g[: {layout.LENGTH_TIMES_ANGLE: 4}.get(code, 2)]
+        g[2] = g[0] * S + g[1] * C
+    elif code == layout.TWO_EQUATIONS:
+        g[2], g[5] = g[0] * S + g[1] * C, g[3] * S + g[4] * C
+    elif code == layout.TWO_ANGLES:
+        g[6] = rng.choice((-1.0, 1.0))
+        g[4] = g[0] * cos(j) + g[1] * sin(j) - g[2] * C - g[3] * S
+        g[5] = g[6] * (g[0] * sin(j) - g[1] * cos(j)) - g[2] * S + g[3] * C
+    elif code == layout.LENGTH_AND_ANGLE:
+        g[1], g[4] = g[0] * S - g[2] * r, g[3] * C - g[5] * r
+    elif code == layout.QUARTIC:
+        g[0] = -(g[1] * C + g[2] * S + g[3] * cos(2 * i) + g[4] * sin(2 * i))
+    elif code == layout.POLYNOMIAL:
+        g[:5] = rng.uniform(0.5, 2) * np.poly(np.arange(-1.5, 2.0) + 0.3 * rng.random(4))[::-1]
+    return g
 
 
 @pytest.mark.parametrize("code", range(10))
@@ -425,22 +337,19 @@ def test_special_positions_of_each_equation(code, g, count, flags, value):
     rows, found = solutions(code, g)
     assert len(rows) == count
     assert found & flags == flags
-    if value is not None:
-        assert abs(rows[0, 0] - value) < 1e-7
+    assert value is None or abs(rows[0, 0] - value) < 1e-7
 
 
 # the explanation
-
-SYMBOLS = {"sqrt": sqrt, "atan2": atan2, "cos": cos, "sin": sin, "π": pi}
 
 
 class Numbers(dict):
     """Values of the symbols of an explanation at a posture and its pose."""
 
     def __init__(self, name, q):
-        model, plan = rm.load(name), plan_of(name)
-        U = plan.form.before @ poses_of(model, plan, q[None])[0] @ plan.form.after
-        super().__init__(SYMBOLS)
+        plan = plan_of(name)
+        U = plan.form.before @ poses_of(model_of(name), plan, q[None])[0] @ plan.form.after
+        super().__init__(sqrt=sqrt, atan2=atan2, cos=cos, sin=sin, π=pi)
         self |= {c + a: U[i, j] for j, c in enumerate("snaP") for i, a in enumerate("xyz")}
         self |= {name: value for name, _, value, _ in plan.arm.constants}
         for row, value in zip(plan.form.rows, q, strict=True):
@@ -453,57 +362,49 @@ class Numbers(dict):
         total = sum((-1 if m else 1) * self[f"θ{j}"] for m, j in re.findall(r"(m?)(\d)", name))
         return (cos if name[0] == "C" else sin)(total)
 
-
-def value_of(formula, known):
-    return eval(formula, {"__builtins__": {}}, known)
-
-
-def angle_gap(a, b):
-    return abs((a - b + pi) % (2 * pi) - pi)
+    def value(self, formula):
+        return eval(formula, {"__builtins__": {}}, self)
 
 
-@pytest.mark.sampled(7)
-@pytest.mark.parametrize("name", COMPLETE)
+def misses(name, step, q, e):
+    """How far the formulas of a step are from the posture, and its equations from zero."""
+    known, gaps = Numbers(name, q), [0.0]
+    known["e"] = e
+    for formula in step.formulas:
+        left, equal, right = formula.split(", e = ")[0].partition(" = ")
+        if not equal or "squared and added" in left or "'" in left:
+            continue
+        value = known.value(right)
+        if re.fullmatch(r"(B|k|R|X|Y|Z|D|a)\d?", left):
+            known[left] = value
+            continue
+        gap = abs(value - known.value(left))
+        if "θ" in left:
+            gap = abs((gap + pi) % (2 * pi) - pi)
+            both = any(f.startswith((f"{left}' =", f"({left})' =")) for f in step.formulas)
+            gap = min(gap, pi - gap) if both else gap
+        gaps.append(gap)
+    sides = [map(known.value, equation.split(" = ")) for equation in step.equations]
+    return max(gaps), max(abs(left - right) for left, right in sides)
+
+
+@pytest.mark.sampled(9)
+@pytest.mark.parametrize("name", [*COMPLETE, *SHORT])
 def test_printed_equations_and_formulas_hold(name):
     """Every equation printed is true of the arm, and every formula gives the joint it names."""
-    told = told_of(name)
     rng = np.random.default_rng(6)
     for _ in range(5):
         q = rng.uniform(-1.5, 1.5, plan_of(name).form.k)
-        for step in told.steps:
-            for e in (1, -1):
-                local, gaps = Numbers(name, q), [0.0]
-                local["e"] = e
-                for formula in step.formulas:
-                    left, right = formula.split(", e = ")[0].split(" = ", 1)
-                    if "squared and added" in left or "'" in left:
-                        continue
-                    value = value_of(right, local)
-                    if re.fullmatch(r"(B|k|R|X|Y|Z|D|a)\d?", left):
-                        local[left] = value
-                    elif "θ" in left:
-                        gap = angle_gap(value, value_of(left, local))
-                        both = any(
-                            f.startswith((f"{left}' =", f"({left})' =")) for f in step.formulas
-                        )
-                        gaps.append(min(gap, pi - gap) if both else gap)
-                    else:
-                        gaps.append(abs(value - value_of(left, local)))
-                if max(gaps) < 1e-9:
-                    break
-            else:
-                raise AssertionError(f"{name}: {step.formulas}")
-            for equation in step.equations:
-                left, right = (value_of(side, local) for side in equation.split(" = "))
-                assert abs(left - right) < 1e-12, equation
+        for step in explained(name).steps:
+            (one, zero), (other, _) = (misses(name, step, q, e) for e in (1, -1))
+            assert min(one, other) < 1e-9, step.formulas
+            assert zero < 1e-12, step.equations
 
 
 def test_rx90_is_the_example_of_the_book():
-    steps = told_of("rx90").steps
-    assert steps[0].matrix_equation == "1T0 U0 = 1T6"
+    steps = explained("rx90").steps
+    assert [s.matrix_equation for s in steps[:2]] == ["1T0 U0 = 1T6", "2T0 U0 = 2T6"]
     assert steps[0].formulas == ("θ1 = atan2(Py, Px)", "θ1' = θ1 + π")
-    assert "O4 is on the axis of joint 1" in steps[0].undetermined
-    assert steps[1].matrix_equation == "2T0 U0 = 2T6"
     assert steps[1].formulas == (
         "B1 = C1*Px + S1*Py",
         "squared and added: X*S2 + Y*C2 = Z",
@@ -518,127 +419,65 @@ def test_rx90_is_the_example_of_the_book():
     assert steps[2].formulas == (
         "θ4 = atan2(S1*ax - C1*ay, -C23*(C1*ax + S1*ay) - S23*az)", "θ4' = θ4 + π",
     )  # fmt: skip
-    assert "axes 4 and 6 are aligned" in steps[2].undetermined
-    assert steps[3].equations == (
+    assert [equation for s in steps[3:] for equation in s.equations] == [
         "S5 = -C4*(C23*(C1*ax + S1*ay) + S23*az) + S4*(S1*ax - C1*ay)",
         "C5 = -S23*(C1*ax + S1*ay) + C23*az",
-    )
-    assert steps[4].equations == (
         "S6 = -S4*(C23*(C1*sx + S1*sy) + S23*sz) - C4*(S1*sx - C1*sy)",
         "C6 = -S4*(C23*(C1*nx + S1*ny) + S23*nz) - C4*(S1*nx - C1*ny)",
-    )
-
-
-def test_exercise_rr():
-    told = told_of("lab_rr")
-    assert told.steps[0].formulas == ("θ1 = atan2(Py, Px)", "θ1' = θ1 + π")  # (4.9)
-    assert told.steps[1].formulas == ("θ2 = atan2(RL1 - Pz, C1*Px + S1*Py)",)  # (4.13)
-    assert "loses" in told.text
-    assert rm.igm(rm.load("lab_rr"), rm.dgm(rm.load("lab_rr"), [2.5, 0.4])).q.round(9).tolist() == [
-        [2.5, 0.4]
     ]
 
 
-def test_exercise_rrt_and_trr():
-    rrt = told_of("lab_rrt")
-    assert [s.joints for s in rrt.steps] == [("θ1",), ("θ2",), ("r3",)]
-    assert rrt.steps[2].formulas == ("r3 = S2*(C1*Px + S1*Py) - C2*(RL1 - Pz)",)
-    trr = told_of("lab_trr")
-    assert trr.steps[0].formulas == ("r1 = Py",)
-    assert [s.joints for s in trr.steps] == [("r1",), ("θ2",), ("θ3",)]
-
-
-def test_ur5_sums_of_angles():
-    told = told_of("ur5")
-    assert told.steps[3].joints == ("θ2 + θ3 + θ4",)
-    assert told.steps[4].joints == ("θ2", "θ2 + θ3")
-    assert told.steps[4].formulas[-1] == "θ4 = (θ2 + θ3 + θ4) - (θ2 + θ3)"
+@pytest.mark.parametrize(
+    ("name", "lines"),
+    [
+        # the exercise, eq. (4.9) and (4.13)
+        ("lab_rr", ["θ1 = atan2(Py, Px)", "θ1' = θ1 + π", "θ2 = atan2(RL1 - Pz, C1*Px + S1*Py)",
+                    "atan2 keeps the quadrant that arctan(y/x) loses"]),
+        ("lab_rrt", ["r3 = S2*(C1*Px + S1*Py) - C2*(RL1 - Pz)", "offset: q2 = θ2 - π/2."]),
+        ("lab_trr", ["r1 = Py"]),
+        ("rx90", ["O4 is on the axis of joint 1", "axes 4 and 6 are aligned"]),
+        ("gantry", ["axes 4 and 6 are aligned"]),
+        ("ur3e", ["axes 2 and 6 are parallel"]),
+        ("ur5", ["axes 2 and 6 are parallel", "Step 4: θ2 + θ3 + θ4 (", "Step 5: θ2 and θ2 + θ3 (",
+                 "θ4 = (θ2 + θ3 + θ4) - (θ2 + θ3)"]),
+        ("tx40", ["offset: q2 = θ2 + π/2, q3 = θ3 - π/2, q6 = θ6 - π."]),
+        ("xarm5", ["q2 = θ2 + 1.38491787287, q3"]),
+        # numbers of q, frames of θ: frame 2 is fixed and joint 1 of the model is a side branch
+        ({"antecedent": [0, 0, 2, 3], "sigma": [0, 0, 0, 2], "d": [0, 0.1, 0.3, 0.2],
+          "alpha": [0, 0, RIGHT, 0], "theta": [0, 0, RIGHT / 2, 0], "mu": [1, 1, 1, 0]},
+         ["Step 1: θ2", "Step 2: θ3", "offset: q3 = θ3 - π/4."]),
+        ("crx10ia", ["over: Raghavan"]),
+        ("panda", ["over: a locked joint (`lock` of `igm`), as the arm has no arm angle"]),
+        ("iiwa14", ["the arm angle (`arm_angle` of `igm`), as shoulder and wrist are spherical"]),
+        ({"antecedent": range(6), "sigma": [0] * 6, "alpha": [0, 1.0, 0.7, -RIGHT, RIGHT, -RIGHT],
+          "d": [0, 0.3, 0.4, 0, 0, 0], "r": [0, 0.1, 0.2, 0.4, 0, 0]},
+         ["Paul's method stops here", "over: Pieper's"]),
+    ],
+)  # fmt: skip
+def test_lines_of_explanations(name, lines):
+    model = rm.load(name) if isinstance(name, str) else rm.RobotModel.from_table(rm.DHTable(**name))
+    text = explain_igm(model).text
+    assert not [line for line in lines if line not in text]
+    assert "1.5707963" not in text
 
 
 ENVIRONMENT = re.compile(r"\\begin\{(align\*|equation\*)\}\n(.*?)\n\\end\{\1\}", re.DOTALL)
 
 
-@pytest.mark.parametrize("name", ["lab_rrt", "cobra_s600", "ur5", "erd:kinova", "erd:borinot_arm"])
+@pytest.mark.sampled(4)
+@pytest.mark.parametrize("name", ["cobra_s600", "ur5", "erd:kinova", "erd:borinot_arm", *SHORT])
 def test_latex_is_read_by_a_parser_of_it(name):
-    from matplotlib.mathtext import MathTextParser
-
-    parser, latex = MathTextParser("path"), told_of(name).latex
+    parser, latex = MathTextParser("path"), explained(name).latex
     rows = [row for kind, body in ENVIRONMENT.findall(latex) if kind == "align*"
             for row in body.split(" \\\\\n")]  # fmt: skip
     inline = re.findall(r"\$([^$]+)\$", ENVIRONMENT.sub("", latex))
-    assert len(rows) > 3
+    assert rows
     for formula in {*rows, *inline}:
         parser.parse(f"${formula.replace('&', '')}$")
+        assert not re.search(r"\*|(?<!\\)theta|\+-|(?<![\\A-Za-z])[A-Za-z]\d", formula)
 
 
-@pytest.mark.parametrize("type_", list(EquationType))
-def test_formulas_of_the_types_are_typeset(type_):
-    from matplotlib.mathtext import MathTextParser
-
-    formula = type_formula(type_.formula)
-    MathTextParser("path").parse(f"${formula.latex}$")
-    assert formula.text == type_.formula
-    assert not re.search(r"[A-Za-z]\d|theta(?<!\\theta)|\+-", formula.latex)
-    if type_ is EquationType.TYPE_7:
-        assert r"\pm (W_{1} \, S_{j} - W_{2} \, C_{j}) = X \, S_{i}" in formula.latex
-
-
-def test_offsets_are_multiples_of_pi_where_they_are():
-    assert "offset: q2 = θ2 - π/2." in told_of("lab_rrt").text
-    assert "offset: q2 = θ2 + π/2, q3 = θ3 - π/2, q6 = θ6 - π." in told_of("tx40").text
-    assert "q2 = θ2 + 1.38491787287, q3" in told_of("xarm5").text
-    assert "offset" not in told_of("erd:ur5").text  # 5e-12 rad: the table prints none either
-    for name in COMPLETE:
-        assert "1.5707963" not in told_of(name).text + told_of(name).latex
-
-
-def test_an_offset_is_of_the_joint_that_the_model_counts():
-    """Frame 2 is fixed and joint 1 of the model is a side branch: numbers of q, frames of θ."""
-    table = rm.DHTable(
-        antecedent=[0, 0, 2, 3], sigma=[0, 0, 0, 2], d=[0, 0.1, 0.3, 0.2],
-        alpha=[0, 0, RIGHT, 0], theta=[0, 0, RIGHT / 2, 0], mu=[1, 1, 1, 0],
-    )  # fmt: skip
-    told = explain_igm(rm.RobotModel.from_table(table))
-    assert [step.joints for step in told.steps] == [("θ2",), ("θ3",)]
-    assert "offset: q3 = θ3 - π/4." in told.text
-
-
-@pytest.mark.parametrize(
-    ("name", "method"),
-    [
-        ("crx10ia", "Raghavan"),
-        ("xarm6", "Raghavan"),
-        ("panda", "a locked joint (`lock` of `igm`), as the arm has no arm angle"),
-        ("erd:baxter_left_arm", "a locked joint"),
-        ("iiwa14", "the arm angle (`arm_angle` of `igm`), as shoulder and wrist are spherical"),
-    ],
-)
-def test_what_takes_over(name, method):
-    assert method in told_of(name).takes_over
-
-
-@pytest.mark.parametrize(
-    ("name", "step", "words"),
-    [
-        ("ur5", 1, "axes 2 and 6 are parallel"),
-        ("ur3e", 1, "axes 2 and 6 are parallel"),
-        ("rx90", 2, "axes 4 and 6 are aligned"),
-        ("irb140", 2, "axes 4 and 6 are aligned"),
-        ("gantry", 3, "axes 4 and 6 are aligned"),
-    ],
-)
-def test_axes_that_cannot_meet_are_parallel_not_aligned(name, step, words):
-    assert words in told_of(name).steps[step].undetermined
-
-
-@pytest.mark.parametrize("model", ["rx90", None, rm.load("rx90").table])
+@pytest.mark.parametrize("model", ["rx90", None])
 def test_only_a_model_is_explained(model):
     with pytest.raises(InvalidValueError, match="model: expected a RobotModel, got "):
         explain_igm(model)
-
-
-def test_pieper_takes_over_where_a_wrist_needs_a_quartic():
-    rows = [{}, {"alpha": 1.0, "d": 0.3, "r": 0.1}, {"alpha": 0.7, "d": 0.4, "r": 0.2}, *WRIST]
-    told = explain_igm(rm.RobotModel.from_table(rm.DHTable.from_rows(rows)))
-    assert not told.complete
-    assert "Pieper" in told.takes_over

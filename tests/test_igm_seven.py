@@ -216,7 +216,7 @@ def test_aligned_and_stretched_postures_take_the_reference(name, places, freed):
 
 
 @pytest.mark.parametrize("joint", [1, 5])
-@pytest.mark.parametrize("tiny", [1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3])
+@pytest.mark.parametrize("tiny", [1e-12, 1e-10, 1e-8, 1e-6, 1e-3])
 def test_both_branches_beside_an_aligned_joint(joint, tiny):
     """Its neighbours are known by their sum only, the better the farther it is from aligned."""
     q = random_postures(60, seed=7)
@@ -256,8 +256,6 @@ def test_other_arms_have_no_arm_angle():
     for name in ("panda", "erd:xarm7", "rx90", "lab_rr", "erd:talos_left_arm"):
         assert prepare_arm_angle(joint_chain(load(name))) is None
     chain, _ = arm("iiwa14")
-    prismatic = JointChain(chain.columns, np.array([0, 0, 0, 1, 0, 0, 0]), chain.D, chain.base)
-    assert prepare_arm_angle(prismatic) is None
     # axes that miss each other by a millimetre
     D = np.array(chain.D)
     D[1, 0, 3] += 1e-3
@@ -283,32 +281,27 @@ def test_a_rounded_table_counts_as_structured_and_is_solved_exactly():
 
 # --- locked joints -------------------------------------------------------------------------------
 
-LOCKED = [(name, joint) for name in ("iiwa14", "panda", "erd:xarm7") for joint in range(7)] + [
-    ("erd:talos_left_arm", 1), ("erd:talos_right_arm", 5), ("erd:baxter_left_arm", 3),
-    ("erd:tiago_arm", 4), ("erd:tiago_pro_left_arm", 0), ("erd:pr2_left_arm", 0),
-    ("erd:icub_left_arm", 2), ("erd:g1_left_arm", 0), ("erd:human_left_arm", 3),
+LOCKED = [
+    *((name, {joint: 0.7}) for name in ("iiwa14", "panda", "erd:xarm7") for joint in range(7)),
+    *((name, {joint: 0.7}) for name, joint in [
+        ("erd:talos_left_arm", 1), ("erd:talos_right_arm", 5), ("erd:baxter_left_arm", 3),
+        ("erd:tiago_arm", 4), ("erd:tiago_pro_left_arm", 0), ("erd:pr2_left_arm", 0),
+        ("erd:icub_left_arm", 2), ("erd:g1_left_arm", 0), ("erd:human_left_arm", 3)]),
+    ("iiwa14", {5: 0.8, 2: 0.4}),
 ]  # fmt: skip
 
 
 @pytest.mark.sampled(6)
-@pytest.mark.parametrize(("name", "joint"), LOCKED)
-def test_any_joint_may_be_locked(name, joint):
+@pytest.mark.parametrize(("name", "lock"), LOCKED)
+def test_any_joint_may_be_locked(name, lock):
     model = load(name)
     q = random_postures(40, seed=13)
-    q[:, joint] = 0.7
+    q[:, list(lock)] = list(lock.values())
     T = dgm(model, q)
-    found = igm(model, T, q, lock={joint: 0.7})
+    found = igm(model, T, q, lock=lock)
     n, s = np.nonzero(found.valid)
     assert np.abs(dgm(model, found.q[n, s]) - T[n]).max() <= 1e-12
-    assert np.all(found.q[n, s, joint] == 0.7)
+    assert np.all(found.q[n, s][:, list(lock)] == list(lock.values()))
     assert np.nanmin(gaps(found.q, q), axis=1).max() < 1e-6
     assert np.all((found.count + found.double.sum(axis=1)) % 2 == 0)
-    assert not found.free_joints[..., joint].any()
-
-
-def test_two_locked_joints_leave_a_robot_of_five():
-    model = load("iiwa14")
-    q = random_postures(20, seed=15)
-    q[:, [2, 5]] = 0.4, 0.8
-    found = igm(model, dgm(model, q), q, lock={5: 0.8, 2: 0.4})
-    assert np.nanmin(gaps(found.q, q), axis=1).max() < 1e-6
+    assert not found.free_joints[..., list(lock)].any()

@@ -17,8 +17,8 @@ from .unknowns import Joints
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Candidate:
-    """Equations of the catalogue that give one or two unknowns.
+class Step:
+    """Equations of the catalogue that give one or two unknowns: a candidate, a step of a plan.
 
     ``unknowns`` in the order in which the type names them; ``coefficients`` in the order of its
     formula (X, Y, Z of type 2; X1, Y1, Z1, X2, Y2, Z2 of type 3; ...).
@@ -30,12 +30,14 @@ class Candidate:
     equations: tuple[Equation, ...]
 
 
+Rows = tuple[tuple[list[Expression], Expression], ...]
+"""Of each equation the coefficients of its atoms, and the rest."""
 _WEAK = 1e-6
 _MOST_ROWS = 8
 """Equations in the same unknowns that are combined in pairs: the shortest."""
 
 
-def candidates(equations: Sequence[Equation], joints: Joints) -> list[Candidate]:
+def candidates(equations: Sequence[Equation], joints: Joints) -> list[Step]:
     """Everything of the catalogue that is found among equations."""
     single: dict[int, list[Equation]] = {}
     double: dict[object, list[Equation]] = {}
@@ -44,39 +46,35 @@ def candidates(equations: Sequence[Equation], joints: Joints) -> list[Candidate]
             single.setdefault(next(iter(equation.unknowns)), []).append(equation)
         else:
             double.setdefault((equation.unknowns, equation.split), []).append(equation)
-    out: list[Candidate] = []
+    out: list[Step] = []
     for number, group in single.items():
         of = _lengths if joints.unknowns[number].slides else _angles
         out += of(number, group, joints)
-    if out:
-        return out
     for find in (_pair, _polynomial):
+        if out:
+            break
         for group in double.values():
             short = sorted(group, key=lambda e: (not e.of_position, e.length))[:_MOST_ROWS]
             a, b = sorted(short[0].unknowns)
-            for first, second in permutations(short, 2):
-                for i, j in ((a, b), (b, a)):
-                    found = find(i, j, first, second, joints)
-                    if found is not None:
-                        out.append(found)
-        if out:
-            return out
+            for pair in permutations(short, 2):
+                found = (find(i, j, pair, joints) for i, j in ((a, b), (b, a)))
+                out += [step for step in found if step is not None]
     return out
 
 
-def cost(c: Candidate, joints: Joints) -> tuple[float, ...]:
+def cost(c: Step, joints: Joints) -> tuple[float, ...]:
     """Price of a candidate: few unknowns, position, one solution, short formulas."""
-    graph = joints.graph
+    graph, rank = joints.graph, c.type.rank
     items = [joints.unknowns[u] for u in c.unknowns]
-    order = _ORDER[c.type]
-    if c.type is EquationType.TYPE_3 and not graph.is_constant(_determinant(c, graph)):
-        order = 1
+    if c.type is EquationType.TYPE_3:
+        X1, Y1, _, X2, Y2, _ = c.coefficients
+        rank = 0 if graph.is_constant(graph.determinant(X1, Y1, X2, Y2)) else 1
     if c.type is EquationType.TYPE_1 and not graph.is_constant(c.coefficients[0]):
-        order = 4
+        rank = 4
     return (
         len(frozenset().union(*(e.unknowns for e in c.equations))),
         any(not _is_position(e, joints) for e in c.equations),
-        order,
+        rank,
         sum(len(i.terms) > 1 for i in items),
         min(j for i in items for j, _ in i.terms),
         sum(e.length for e in c.equations) + 3 * sum(e.split.inverse for e in c.equations),
@@ -85,32 +83,22 @@ def cost(c: Candidate, joints: Joints) -> tuple[float, ...]:
     )
 
 
-_ORDER = {
-    EquationType.TYPE_1: 0, EquationType.TYPE_3_DIRECT: 0, EquationType.TYPE_3: 0,
-    EquationType.TYPE_2_ZERO: 2, EquationType.TYPE_2: 3, EquationType.TYPE_4: 0,
-    EquationType.TYPE_5: 2, EquationType.TYPE_8: 1, EquationType.TYPE_6: 3,
-    EquationType.TYPE_7: 4, EquationType.POLYNOMIAL: 5, EquationType.QUARTIC: 6,
-}  # fmt: skip
-
-
 def _is_position(equation: Equation, joints: Joints) -> bool:
     """Whether it compares positions, and no unknown joint was moved behind the pose."""
     moved = range(equation.split.p, joints.form.k)
     return equation.of_position and all(joints.knows(j) for j in moved)
 
 
-def _determinant(c: Candidate, graph: Graph) -> Expression:
-    X1, Y1, _, X2, Y2, _ = c.coefficients
-    return graph.sum((graph.product(X1, Y2), negative(graph.product(X2, Y1))))
-
-
-def _rows(equation: Equation, *atoms: int) -> tuple[list[Expression], Expression] | None:
-    """Coefficients of single atoms and of 1 in an equation that has nothing else."""
-    p = equation.polynomial
+def _rows(equations: Sequence[Equation], *atoms: int) -> Rows | None:
+    """Coefficients of single atoms and of 1 in equations that have nothing else."""
     allowed = {(), *((a,) for a in atoms)}
-    if not allowed.issuperset(p):
+    if not all(allowed.issuperset(e.polynomial) for e in equations):
         return None
-    return [part(p, a) for a in atoms], part(p)
+    return tuple(([part(e.polynomial, a) for a in atoms], part(e.polynomial)) for e in equations)
+
+
+def _times(sign: float, *parts: Expression) -> tuple[Expression, ...]:
+    return tuple((sign * f, n) for f, n in parts)
 
 
 def _strong(graph: Graph, *parts: Expression) -> bool:
@@ -119,57 +107,45 @@ def _strong(graph: Graph, *parts: Expression) -> bool:
     return float(np.median(size)) > _WEAK
 
 
-def _lengths(number: int, group: list[Equation], joints: Joints) -> Iterable[Candidate]:
+def _lengths(number: int, group: list[Equation], joints: Joints) -> Iterable[Step]:
     graph, r = joints.graph, length(number)
     for e in group:
-        p = e.polynomial
-        degree = max(len(m) for m in p)
-        if degree == 1 and _strong(graph, part(p, r)):
-            found = Candidate(EquationType.TYPE_1, (number,), (part(p, r), negative(part(p))),
-                              (e,))  # fmt: skip
-            yield found
+        powers = tuple(part(e.polynomial, *[r] * i) for i in range(5))
+        degree = max(map(len, e.polynomial))
+        if degree == 1 and _strong(graph, powers[1]):
+            yield Step(EquationType.TYPE_1, (number,), (powers[1], negative(powers[0])), (e,))
         elif 1 < degree <= 4:
-            powers = tuple(part(p, *[r] * i) for i in range(5))
-            yield Candidate(EquationType.POLYNOMIAL, (number,), powers, (e,))  # fmt: skip
+            yield Step(EquationType.POLYNOMIAL, (number,), powers, (e,))
 
 
-def _angles(number: int, group: list[Equation], joints: Joints) -> Iterable[Candidate]:
-    graph, C, S = joints.graph, cosine(number), sine(number)
+def _angles(number: int, group: list[Equation], joints: Joints) -> Iterable[Step]:
+    graph, of = joints.graph, (number,)
     rows: list[tuple[Equation, Expression, Expression, Expression]] = []
     for e in group:
-        found = _rows(e, S, C)
+        found = _rows((e,), sine(number), cosine(number))
         if found is None:
             continue
-        (X, Y), k = found
+        (((X, Y), k),) = found
         if not _strong(graph, X, Y):
             continue
         rows.append((e, X, Y, negative(k)))
         if k[0]:
-            one = Candidate(EquationType.TYPE_2, (number,), (X, Y, negative(k)), (e,))
+            yield Step(EquationType.TYPE_2, of, (X, Y, negative(k)), (e,))
         else:
-            signed = _signed(number, X, Y, joints)
-            one = Candidate(EquationType.TYPE_2_ZERO, (number,), signed, (e,))
-        yield one
+            yield Step(EquationType.TYPE_2_ZERO, of, _signed(number, X, Y, joints), (e,))
     rows.sort(key=lambda row: (not _is_position(row[0], joints), row[0].length))
     for a, b in combinations(rows[:_MOST_ROWS], 2):
-        (_, X1, Y1, Z1), (_, X2, Y2, Z2) = a, b
-        det = graph.values(X1) * graph.values(Y2) - graph.values(X2) * graph.values(Y1)
-        size = np.hypot(graph.values(X1), graph.values(Y1))
-        size = size * np.hypot(graph.values(X2), graph.values(Y2))
-        if np.median(np.abs(det) / np.maximum(size, 1e-300)) < 1e-2:
+        (x1, y1, _), (x2, y2, _) = (map(graph.values, row[1:]) for row in (a, b))
+        size = np.hypot(x1, y1) * np.hypot(x2, y2)
+        if np.median(np.abs(x1 * y2 - x2 * y1) / np.maximum(size, 1e-300)) < 1e-2:
             continue
-        pair = (a[0], b[0])
-        direct = _direct(graph, a[1:], b[1:])
-        if direct is None:
-            turned = _direct(graph, b[1:], a[1:])
-            if turned is not None:
-                direct, pair = turned, (b[0], a[0])
-        one = (
-            Candidate(EquationType.TYPE_3, (number,), (X1, Y1, Z1, X2, Y2, Z2), pair)
-            if direct is None
-            else Candidate(EquationType.TYPE_3_DIRECT, (number,), direct, pair)
-        )
-        yield one
+        for one, two in ((a, b), (b, a)):
+            direct = _direct(graph, one[1:], two[1:])
+            if direct is not None:
+                yield Step(EquationType.TYPE_3_DIRECT, of, direct, (one[0], two[0]))
+                break
+        else:
+            yield Step(EquationType.TYPE_3, of, (*a[1:], *b[1:]), (a[0], b[0]))
 
 
 def _direct(
@@ -181,30 +157,25 @@ def _direct(
         return None
     sign = 1.0 if graph.values(X1)[0] > 0 else -1.0
     same = sign if X1[0] == Y2[0] else -sign
-    return (sign * X1[0], X1[1]), (sign * Z1[0], Z1[1]), (same * Z2[0], Z2[1])
+    return (*_times(sign, X1, Z1), *_times(same, Z2))
 
 
-def _signed(
-    number: int, X: Expression, Y: Expression, joints: Joints
-) -> tuple[Expression, Expression]:
+def _signed(number: int, X: Expression, Y: Expression, joints: Joints) -> tuple[Expression, ...]:
     """The sign of type 2 with Z = 0: ``atan2(-Y, X)`` is the solution that is named first.
 
     Of a wrist it is the one with a positive sine of the angle between the aligned axes, as in the
     book; else the one that needs fewer minus signs.
     """
-    graph = joints.graph
     other = positive_sine(number, X, Y, joints)
     if other is not None:
-        return (X, Y) if other[1] > 0 else (negative(X), negative(Y))
+        return _times(float(np.sign(other[1])), X, Y)
 
     def weight(e: Expression) -> int:
-        node = graph.nodes[e[1]]
+        node = joints.graph.nodes[e[1]]
         parts = node.parts if node.kind is Kind.SUM else ((1.0, e[1]),)
         return sum(1 if e[0] * f > 0 else -1 for f, _ in parts)
 
-    if weight(X) - weight(Y) < 0:
-        return negative(X), negative(Y)
-    return X, Y
+    return _times(-1.0 if weight(X) < weight(Y) else 1.0, X, Y)
 
 
 def positive_sine(
@@ -222,168 +193,100 @@ def positive_sine(
     return None
 
 
-def _pair(i: int, j: int, first: Equation, second: Equation, joints: Joints) -> Candidate | None:
-    """Two equations in two unknowns; i is solved first."""
-    a, b = joints.unknowns[i], joints.unknowns[j]
-    if a.slides and b.slides:
-        return None
-    if b.slides:
-        return _products(i, j, first, second, joints)
-    if a.slides:
-        return _length_and_angle(i, j, first, second, joints)
-    return _two_angles(i, j, first, second, joints)
-
-
-def _products(
-    i: int, j: int, first: Equation, second: Equation, joints: Joints
-) -> Candidate | None:
-    """Type 4: an angle i and a length j that multiplies its sine and cosine."""
-    r, C, S = length(j), cosine(i), sine(i)
-    p, q = first.polynomial, second.polynomial
-    with_sine, with_cosine = tuple(sorted((r, S))), tuple(sorted((r, C)))
-    if not {with_sine, ()}.issuperset(p) or not {with_cosine, ()}.issuperset(q):
-        return None
-    coefficients = (p[with_sine], negative(part(p)), q[with_cosine], negative(part(q)))
-    if not _strong(joints.graph, coefficients[0]) or not _strong(joints.graph, coefficients[2]):
-        return None
-    return Candidate(EquationType.TYPE_4, (j, i), coefficients, (first, second))
-
-
-def _length_and_angle(
-    i: int, j: int, first: Equation, second: Equation, joints: Joints
-) -> Candidate | None:
-    """Length i and angle j: type 5, or the polynomial of degree two in the length."""
+def _pair(i: int, j: int, pair: tuple[Equation, Equation], joints: Joints) -> Step | None:
+    """Types 4 to 8: two equations in two unknowns; i is solved first, but for type 4."""
     graph = joints.graph
-    one, two = (_rows(e, sine(j), cosine(j), length(i)) for e in (first, second))
-    if one is None or two is None:
+    i_slides, j_slides = (joints.unknowns[u].slides for u in (i, j))
+    if j_slides:
+        with_sine, with_cosine = (tuple(sorted((length(j), u))) for u in (sine(i), cosine(i)))
+        p, q = (e.polynomial for e in pair)
+        if i_slides or not {with_sine, ()} >= p.keys() or not {with_cosine, ()} >= q.keys():
+            return None
+        values = (p[with_sine], negative(part(p)), q[with_cosine], negative(part(q)))
+        if not _strong(graph, values[0]) or not _strong(graph, values[2]):
+            return None
+        return Step(EquationType.TYPE_4, (j, i), values, pair)
+    own = (length(i),) if i_slides else (sine(i), cosine(i))
+    rows = _rows(pair, sine(j), cosine(j), *own)
+    if rows is None:
         return None
-    ((s1, c1, r1), k1), ((s2, c2, r2), k2) = one, two
-    if not r1[0] and not r2[0]:
+    if not i_slides:
+        return _two_angles(i, j, rows, pair, joints)
+    ((s1, c1, r1), k1), ((s2, c2, r2), k2) = rows
+    if not (r1[0] or r2[0]) or c1[0] or s2[0]:
         return None
-    if not c1[0] and not s2[0] and _strong(graph, s1) and _strong(graph, c2):
-        values = (s1, negative(k1), negative(r1), c2, negative(k2), negative(r2))
-        return Candidate(EquationType.TYPE_5, (i, j), values, (first, second))
-    return None
+    if not _strong(graph, s1) or not _strong(graph, c2):
+        return None
+    values = (s1, negative(k1), negative(r1), c2, negative(k2), negative(r2))
+    return Step(EquationType.TYPE_5, (i, j), values, pair)
 
 
 def _two_angles(
-    i: int, j: int, first: Equation, second: Equation, joints: Joints
-) -> Candidate | None:
-    """Types 6 to 8, or a quartic in angle i."""
+    i: int, j: int, rows: Rows, pair: tuple[Equation, Equation], joints: Joints
+) -> Step | None:
+    """Types 6 to 8."""
     graph = joints.graph
-    one, two = (_rows(e, sine(j), cosine(j), sine(i), cosine(i)) for e in (first, second))
-    if one is None or two is None:
-        return None
-    ((sj1, cj1, si1, ci1), k1), ((sj2, cj2, si2, ci2), k2) = one, two
-    pair = (first, second)
+    ((sj1, cj1, si1, ci1), k1), (second, rest) = rows
     for sign in (1.0, -1.0):
         # an equation and its negative are the same
-        s2, c2, k = ((sign * f, n) for f, n in (si2, ci2, k2))
+        sj, cj, s2, c2, k = _times(sign, *second, rest)
         if ci1 != s2 or negative(si1) != c2 or not _strong(graph, ci1, si1):
             continue
-        sj, cj = ((sign * f, n) for f, n in (sj2, cj2))
-        eighth = _type_8(i, j, (cj1, sj1, ci1, si1, k1), (sj, cj, s2, c2, k), pair, joints)
-        if eighth is not None:
-            return eighth
-        right = (negative(ci1), negative(si1), negative(k1), negative(k))
         if not graph.is_constant(sj1) or not graph.is_constant(cj1):
             continue
+        zero = not (sj1[0] or si1[0] or cj[0] or c2[0])
+        if zero and cj1 == sj and graph.is_constant(ci1) and _is_sum(i, j, joints):
+            positive = 1.0 if ci1[0] > 0 else -1.0
+            values = _times(positive, ci1, cj1, negative(k1), negative(k))
+            return Step(EquationType.TYPE_8, (i, j), values, pair)
+        right = _times(-1.0, ci1, si1, k1, k)
         if not cj1[0] and not sj[0] and sj1 == cj:
-            positive = 1.0 if sj1[0] > 0 else -1.0
-            values = tuple((positive * f, n) for f, n in (sj1, *right))
-            return Candidate(EquationType.TYPE_6, (i, j), values, pair)
+            values = _times(1.0 if sj1[0] > 0 else -1.0, sj1, *right)
+            return Step(EquationType.TYPE_6, (i, j), values, pair)
         for sense in (1.0, -1.0):
             if sj == (sense * cj1[0], cj1[1]) and cj == (-sense * sj1[0], sj1[1]):
                 values = (cj1, sj1, *right, (sense, ONE))
-                return Candidate(EquationType.TYPE_7, (i, j), values, pair)
+                return Step(EquationType.TYPE_7, (i, j), values, pair)
     return None
 
 
-def _type_8(
-    i: int,
-    j: int,
-    first: tuple[Expression, ...],
-    second: tuple[Expression, ...],
-    pair: tuple[Equation, Equation],
-    joints: Joints,
-) -> Candidate | None:
-    """Type 8: j is the sum of i and another joint, both seen from the same frame.
-
-    ``first`` is in Cj, Sj, Ci, Si, 1 and ``second`` in Sj, Cj, Si, Ci, 1.
-    """
-    graph = joints.graph
-    if any(e[0] for e in (first[1], first[3], second[1], second[3])):
-        return None
-    if first[0] != second[0] or first[2] != second[2]:
-        return None
+def _is_sum(i: int, j: int, joints: Joints) -> bool:
+    """Whether the angle j is the sum of i and another joint, both seen from the same frame."""
     a, b = joints.unknowns[i].span, joints.unknowns[j].span
-    if a is None or b is None or a.group != b.group or a.a != b.a or not a.b < b.b:
-        return None
-    if not graph.is_constant(first[0]) or not graph.is_constant(first[2]):
-        return None
-    sign = 1.0 if first[2][0] > 0 else -1.0
-    terms = (first[2], first[0], negative(first[4]), negative(second[4]))
-    values = tuple((sign * f, n) for f, n in terms)
-    return Candidate(EquationType.TYPE_8, (i, j), values, pair)
+    return a is not None and b is not None and (a.group, a.a) == (b.group, b.a) and a.b < b.b
 
 
-def _polynomial(
-    i: int, j: int, first: Equation, second: Equation, joints: Joints
-) -> Candidate | None:
-    """The angle j eliminated from two equations: a polynomial in i."""
-    if joints.unknowns[j].slides or first.row > second.row:
+def _polynomial(i: int, j: int, pair: tuple[Equation, Equation], joints: Joints) -> Step | None:
+    """The angle j eliminated from two equations: degree two in a length, a quartic in an angle."""
+    slides, graph = joints.unknowns[i].slides, joints.graph
+    if joints.unknowns[j].slides or pair[0].row > pair[1].row:
         return None
-    if joints.unknowns[i].slides:
-        return _in_a_length(i, j, first, second, joints)
-    return _in_an_angle(i, j, first, second, joints)
-
-
-def _in_a_length(
-    i: int, j: int, first: Equation, second: Equation, joints: Joints
-) -> Candidate | None:
-    """Degree two in the length i."""
-    graph = joints.graph
-    one, two = (_rows(e, sine(j), cosine(j), length(i)) for e in (first, second))
-    if one is None or two is None:
+    own = (length(i),) if slides else (cosine(i), sine(i))
+    rows = _rows(pair, sine(j), cosine(j), *own)
+    if rows is None:
         return None
-    ((s1, c1, r1), k1), ((s2, c2, r2), k2) = one, two
-    product, add = graph.product, graph.sum
-    det = add((product(s1, c2), negative(product(s2, c1))))
-    if not _strong(graph, det):
+    ((s1, c1, *x1), k1), ((s2, c2, *x2), k2) = rows
+    det = graph.determinant(s1, c1, s2, c2)
+    if not (slides or graph.is_constant(det)) or not _strong(graph, det):
         return None
-    # det (S, C) = -(adjugate) (k + r_i), squares added
-    u = [add((product(c2, x), negative(product(c1, y)))) for x, y in ((k1, k2), (r1, r2))]
-    v = [add((product(s1, y), negative(product(s2, x)))) for x, y in ((k1, k2), (r1, r2))]
-    a0 = add((product(u[0], u[0]), product(v[0], v[0]), negative(product(det, det))))
-    a1 = add((product((2.0, ONE), u[0], u[1]), product((2.0, ONE), v[0], v[1])))
-    a2 = add((product(u[1], u[1]), product(v[1], v[1])))
-    powers = (a0, a1, a2, ZERO, ZERO)
-    return Candidate(EquationType.POLYNOMIAL, (i,), powers, (first, second))
-
-
-def _in_an_angle(
-    i: int, j: int, first: Equation, second: Equation, joints: Joints
-) -> Candidate | None:
-    """A quartic in the angle i."""
-    graph = joints.graph
-    one, two = (_rows(e, sine(j), cosine(j), sine(i), cosine(i)) for e in (first, second))
-    if one is None or two is None:
-        return None
-    ((sj1, cj1, si1, ci1), k1), ((sj2, cj2, si2, ci2), k2) = one, two
-    pair = (first, second)
-    product, add = graph.product, graph.sum
-    det = add((product(sj1, cj2), negative(product(sj2, cj1))))
-    if not graph.is_constant(det) or not _strong(graph, det):
-        return None
-    # det (Sj, Cj) = minus the adjugate times (k + c Ci + s Si): squares added
+    # det (Sj, Cj) = minus the adjugate times what is left: squares added are det^2
     u, v = [], []
-    for x, y in ((k1, k2), (ci1, ci2), (si1, si2)):
-        u.append(add((product(cj2, x), negative(product(cj1, y)))))
-        v.append(add((product(sj1, y), negative(product(sj2, x)))))
-    dot = lambda m, n: (product(u[m], u[n]), product(v[m], v[n]))  # noqa: E731
-    half = lambda m, n: [product((0.5, ONE), e) for e in dot(m, n)]  # noqa: E731
-    twice = lambda m, n: [product((2.0, ONE), e) for e in dot(m, n)]  # noqa: E731
-    a0 = add((*dot(0, 0), *half(1, 1), *half(2, 2), negative(product(det, det))))
-    a3 = add((*half(1, 1), *map(negative, half(2, 2))))
-    quartic = (a0, add(twice(0, 1)), add(twice(0, 2)), a3, add(dot(1, 2)))
-    return Candidate(EquationType.QUARTIC, (i,), quartic, pair)
+    for x, y in zip((k1, *x1), (k2, *x2), strict=True):
+        u.append(graph.determinant(x, c1, y, c2))
+        v.append(graph.determinant(s1, x, s2, y))
+
+    def squares(m: int, n: int, factor: float = 1.0) -> tuple[Expression, ...]:
+        return _times(factor, graph.product(u[m], u[n]), graph.product(v[m], v[n]))
+
+    def total(*terms: tuple[Expression, ...]) -> Expression:
+        return graph.sum(e for term in terms for e in term)
+
+    halves = () if slides else (squares(1, 1, 0.5), squares(2, 2, 0.5))
+    a0 = total(squares(0, 0), *halves, (negative(graph.product(det, det)),))
+    a1 = total(squares(0, 1, 2.0))
+    if slides:
+        powers = (a0, a1, total(squares(1, 1)), ZERO, ZERO)
+        return Step(EquationType.POLYNOMIAL, (i,), powers, pair)
+    a3 = total(squares(1, 1, 0.5), squares(2, 2, -0.5))
+    a2, a4 = total(squares(0, 2, 2.0)), total(squares(1, 2))
+    return Step(EquationType.QUARTIC, (i,), (a0, a1, a2, a3, a4), pair)

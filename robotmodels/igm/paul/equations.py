@@ -9,6 +9,7 @@ from math import cos, pi, sin
 import numpy as np
 
 from ..._arrays import Array
+from ..chain import motion
 from .expressions import UNIT, ZERO, Expression, Graph, Kind, negative
 from .normal_form import NormalForm
 from .polynomials import Monomial, minus, plus, unknowns
@@ -68,7 +69,8 @@ class Arm:
         self.K = [self._row_matrix(j) for j in range(form.k)]
         self.E = self._tool_matrix()
         self.joints = Joints(form, graph, [K.R for K in self.K], postures)
-        U = np.array([self._pose(q) for q in postures])
+        U = self.frames(postures)[:, -1]
+        U = U if self.E is None else U @ _number(self.E, graph)
         R = [[self._element(i, j, U) for j in range(3)] for i in range(3)]
         self.U0 = Fixed(R, [self._element(i, 3, U) for i in range(3)], False)
         self.U0_inverse = self.U0.inverse(graph)
@@ -133,17 +135,14 @@ class Arm:
         meaning = f"{column}{axis} of the tool"
         return self._constant(f"{column}{axis}E", f"{column}_{{{axis}E}}", value, meaning)
 
-    def frames(self, q: Array) -> list[Array]:
-        """Poses of the frames of the rows at a posture."""
-        T, out = np.eye(4), []
+    def frames(self, q: Array) -> Array:
+        """Poses of the frames of the rows at postures. Shapes: q (N, k) -> (N, k, 4, 4)."""
+        T: Array = np.eye(4)
+        out = []
         for j, row in enumerate(self.form.rows):
-            T = T @ _number(self.K[j], self.graph) @ _motion(q[j], row.sigma)
+            T = T @ _number(self.K[j], self.graph) @ motion(row.sigma, q[:, j])
             out.append(T)
-        return out
-
-    def _pose(self, q: Array) -> Array:
-        T = self.frames(q)[-1]
-        return T if self.E is None else T @ _number(self.E, self.graph)
+        return np.stack(out, axis=1)
 
     def sides(self, split: Split, K: list[Fixed] | None = None) -> tuple[list[Item], list[Item]]:
         """Matrices on the side of the pose and on the other; ``K`` replaces the constants."""
@@ -221,13 +220,4 @@ def _number(item: Fixed, graph: Graph) -> Array:
     T = np.eye(4)
     T[:3, :3] = [[graph.values(e)[0] for e in row] for row in item.R]
     T[:3, 3] = [graph.values(e)[0] for e in item.p]
-    return T
-
-
-def _motion(x: float, slides: int) -> Array:
-    T = np.eye(4)
-    if slides:
-        T[2, 3] = x
-    else:
-        T[:2, :2] = [[cos(x), -sin(x)], [sin(x), cos(x)]]
     return T

@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
+import numpy as np
+
 from ...geometry import constant_names
-from ...latex_text import markdown
+from ...latex_text import escaped, markdown, meaning_latex, powers, table_latex
 from ...model import RobotModel, check_model
+from ...table_text import SMALLEST, angle_text
 from ..arm_angle import prepare_arm_angle
 from ..loop import JointChain, joint_chain
 from ..structure import Family, plan_loop
 from .plan import PaulPlan, derive_plan
-from .render import render
 from .steps import ExplainedStep, PlanText
+from .types import EquationType
+from .typeset import display, plain
+from .unknowns import JointSum
+from .writer import number
+
+_ARCS = (EquationType.TYPE_2_ZERO, EquationType.TYPE_3, EquationType.TYPE_3_DIRECT)
+"""Types whose solution is an arc tangent of the pose."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -106,25 +116,33 @@ def explain_igm(model: RobotModel) -> InverseModelExplanation:
     θ4 = atan2(S1*ax - C1*ay, -C23*(C1*ax + S1*ay) - S23*az); θ4' = θ4 + π
     """
     check_model(model)
-    chain = joint_chain(model)
-    table = model.table
+    chain, table = joint_chain(model), model.table
     own = constant_names(table.symbols)
-    lengths = [
-        (letter + str(j), column, j)
-        for column, letter in (("d", "D"), ("r", "RL"))
-        for j in range(1, table.f + 1)
-    ]
     names = {
-        usual: (own[usual], float(getattr(table, column)[j - 1]))
-        for usual, column, j in lengths
-        if usual in own
+        usual: (own[usual], float(getattr(table, column)[j]))
+        for column, letter in (("d", "D"), ("r", "RL"))
+        for j in range(table.f)
+        if (usual := f"{letter}{j + 1}") in own
     }
     plan = derive_plan(chain, [int(table.joint_rows[c]) + 1 for c in chain.columns], names)
     words = PlanText(plan)
     steps = tuple(words.step(number, step) for number, step in enumerate(plan.steps))
-    remaining = tuple(words.variable(j) for j in plan.remaining)
-    takes_over = "" if plan.complete else _successor(plan.chain)
-    text, latex = render(model, words, steps, takes_over)
+    takes_over = "" if plan.complete else _successor(chain)
+    # blocks of text and LaTeX; a sentence is markup of `typeset`
+    title = f"Inverse geometric model of {model.name} by Paul's method"
+    blocks = [(title, rf"\textbf{{{escaped(title)}}}"), (str(table), table_latex(str(table)))]
+    before = [_pose_line(model, plan), *_notation(words, steps)]
+    blocks += [(plain(line), words.tex.prose(line)) for line in before]
+    if constants := plan.arm.constants:
+        lines = [f"  {n} = {number(v)}  ({meaning})" for n, _, v, meaning in constants]
+        rows = [rf"{symbol} = {powers(number(v))} \quad ({meaning_latex(meaning)})"
+                for _, symbol, v, meaning in constants]  # fmt: skip
+        blocks.append(("\n".join(["Constants", *lines]), "Constants\n" + display(rows)))
+    blocks += [(step.text, step.latex) for step in steps]
+    end = _end(words, takes_over)
+    blocks.append(("\n".join(map(plain, end)), "\n\n".join(map(words.tex.prose, end))))
+    text, latex = map("\n\n".join, zip(*blocks, strict=True))
+    remaining = tuple(map(words.variable, plan.remaining))
     return InverseModelExplanation(
         model.name, steps, plan.complete, remaining, takes_over, plan, text, latex
     )
@@ -149,3 +167,75 @@ def _successor(chain: JointChain) -> str:
     if loop.family is Family.CONCURRENT:
         return "Pieper's method: three axes meet, and a quartic gives one of the other joints"
     return "the closed form of three parallel axes"
+
+
+def _end(words: PlanText, takes_over: str) -> list[str]:
+    """How many postures or what remains, the offsets, and the quadrants."""
+    plan = words.plan
+    if plan.complete:
+        most = plan.most_postures
+        branches = [str(s.type.branches) for s in plan.steps if s.type.branches > 1]
+        each = f" (${' x '.join(branches)}$)" if len(branches) > 1 else ""
+        lines = [
+            f"At most {most} posture{'s' * (most != 1)}{each}; "
+            "each is checked on the whole pose before it is returned."
+        ]
+    else:
+        rest = ", ".join(f"${words.variable(j)}$" for j in plan.remaining)
+        why = (
+            "there are more joints than components of a pose"
+            if plan.form.k > 6
+            else "no element of any matrix equation, however it is multiplied, has one or two "
+            "unknowns in a form of the catalogue"
+        )
+        lines = [f"Paul's method stops here: {rest} remain, because {why}."]
+        lines.append(f"What takes over: {takes_over}.")
+    offsets = []
+    for j, row in enumerate(plan.form.rows):
+        if abs(row.offset) >= SMALLEST:  # the table shows no others either
+            size = abs(row.offset)
+            value = number(size) if row.sigma else angle_text(size, SMALLEST, number)
+            left = f"q{plan.chain.columns[j] + 1} = {words.variable(j)}"
+            offsets.append(f"${left} {'-' if row.offset > 0 else '+'} {value}$")
+    if plan.steps and offsets:
+        lines.append(f"Joint variables with an offset: {', '.join(offsets)}.")
+    if any(s.type in _ARCS for s in plan.steps):
+        lines.append(
+            "atan2 keeps the quadrant that arctan(y/x) loses; two solutions are both kept."
+        )
+    return lines
+
+
+def _notation(words: PlanText, steps: tuple[ExplainedStep, ...]) -> list[str]:
+    """What C, S and their numbers stand for, with the sums of angles that occur."""
+    used = {n for step in steps for n in re.findall(r"\b[CS]([\dm_]+)\b", step.text)}
+    joints, sums = words.joints, ""
+    for group, members in enumerate(joints.members):
+        for a in range(len(members)):
+            for b in range(a + 2, len(members) + 1):
+                u = joints.unknown(JointSum(group, a, b))
+                name = joints.unknowns[u].name
+                if name in used:
+                    sums += f", $C{name}$ and $S{name}$ of ${words.unknown(u)}$"
+    return [f"$Cj$ and $Sj$ are cosine and sine of $θj${sums}."] if used else []
+
+
+def _pose_line(model: RobotModel, plan: PaulPlan) -> str:
+    """Meaning of U0, Z and E."""
+    form, whole = plan.form, plan.form.k >= 6
+    moved, based, right = (
+        not np.allclose(T, np.eye(4), atol=1e-13) for T in (form.before, model.base, form.after)
+    )
+    constant = "the constant transformation"
+    meanings = ""
+    if left := moved or based:
+        table = f" and {constant} before the first joint" * (whole or moved)
+        meanings += f", $Z$ the base{table}"
+    if right:
+        meanings += f", $E$ {constant} after the last joint, with the tool"
+    elif plan.arm.E is not None:
+        meanings += ", $E$ the tool"
+    U0 = "U0 = " + "Z^-1 " * left + "T" + " E^-1" * right
+    rows = ", ".join("$" + " ".join(c + a for c in "snaP") + "$" for a in "xyz")
+    pose = f"${U0}$: the desired pose{' [1.11]' * whole}, with the elements {rows} [1.13]"
+    return f"{pose}{meanings}."

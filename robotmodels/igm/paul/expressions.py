@@ -133,6 +133,14 @@ class Graph:
             found = self._new(key, Node(Kind.SUM, parts, values))
         return sign, found
 
+    def dot(self, *pairs: tuple[Expression, ...]) -> Expression:
+        """Sum of products."""
+        return self.sum([self.product(*pair) for pair in pairs])
+
+    def determinant(self, a: Expression, b: Expression, c: Expression, d: Expression) -> Expression:
+        """``a d - c b``, of the rows (a, b) and (c, d)."""
+        return self.sum((self.product(a, d), negative(self.product(c, b))))
+
     def leaves(self, e: Expression) -> int:
         """How many symbols are printed for it: a measure of length."""
         node = self.nodes[e[1]]

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import prod
 
 from ...errors import InvalidValueError
 from ..loop import JointChain
-from .catalogue import Candidate, candidates, cost
+from .catalogue import Step, candidates, cost
 from .equations import Arm
 from .normal_form import NormalForm, normal_form
-from .program import Program, Step, compile_plan
+from .program import Program, compile_plan
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,10 +37,7 @@ class PaulPlan:
     @property
     def most_postures(self) -> int:
         """Product of the numbers of solutions of the steps."""
-        most = 1
-        for step in self.steps:
-            most *= step.type.branches
-        return most
+        return prod(step.type.branches for step in self.steps)
 
 
 def derive_plan(
@@ -54,22 +52,16 @@ def derive_plan(
     """
     if chain.k == 0:
         raise InvalidValueError("model: no joint moves its tool; there is nothing to solve.")
-    arm = Arm(normal_form(chain, tuple(frames) or tuple(range(1, chain.k + 1))), names)
-    joints, steps = arm.joints, []
     everyone = range(chain.k)
-    solved: list[int] = []
+    arm = Arm(normal_form(chain, frames or range(1, chain.k + 1)), names)
+    joints, solved = arm.joints, []
+    steps: list[Step] = []
     # more than six joints: some have to be locked first
     while chain.k <= 6 and not all(joints.knows(j) for j in everyone):
         best = _best(arm)
         if best is None:
             break
-        steps.append(
-            Step(
-                best.type, best.unknowns, best.coefficients,
-                tuple(e.split for e in best.equations),
-                tuple((e.row, e.column) for e in best.equations),
-            )
-        )  # fmt: skip
+        steps.append(best)
         for number in best.unknowns:
             joints.settle(number)
         solved += [j for j in everyone if joints.knows(j) and j not in solved]
@@ -78,9 +70,6 @@ def derive_plan(
     return PaulPlan(chain, arm.form, tuple(steps), tuple(solved), remaining, arm, program)
 
 
-def _best(arm: Arm) -> Candidate | None:
-    for inverse in (False, True):
-        found = candidates(arm.equations(inverse), arm.joints)
-        if found:
-            return min(found, key=lambda c: cost(c, arm.joints))
-    return None
+def _best(arm: Arm) -> Step | None:
+    found = candidates(arm.equations(), arm.joints) or candidates(arm.equations(True), arm.joints)
+    return min(found, key=lambda c: cost(c, arm.joints), default=None)

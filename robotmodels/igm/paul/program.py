@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from ..._arrays import Array, read_only
 from . import layout
+from .catalogue import Step
 from .equations import Arm, Split
 from .expressions import ONE, Expression, Graph, Kind
 from .polynomials import part
 from .products import Fixed, product
-from .types import EquationType
 
 SLACK = 1e-9
 """Overshoot beside the amplitude that is tried as a double root."""
@@ -28,17 +28,6 @@ SMALL_AMPLITUDE = 1e-4
 """Amplitudes beside their usual size below which a pose is left to a more careful method."""
 ACCEPTED = 1e-9
 """Largest error of a posture of the plan [m, rad]."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Step:
-    """One step of a plan."""
-
-    type: EquationType
-    unknowns: tuple[int, ...]
-    coefficients: tuple[Expression, ...]
-    splits: tuple[Split, ...]
-    elements: tuple[tuple[int, int], ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,64 +1,78 @@
-"""LaTeX of formulas and sentences, made from their text, so that both say the same.
+"""LaTeX of explanations, made from their text, so that both say the same.
 
-The text of a formula is Python: its syntax tree is written as LaTeX.
+A line of an explanation is markup: words, with formulas between dollar signs. Its text is the
+markup without the signs. A formula is Python, whose syntax tree is written as LaTeX, a product of
+matrices such as ``1T0 U0``, or a formula of the literature such as ``X S + Y C = Z``.
 """
 
 from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
-from fractions import Fraction
-from math import pi
+from collections.abc import Mapping, Sequence
 
 from ...latex_text import escaped, powers
-from ...table_text import SMALLEST
 
-_OPERATORS = {ast.Add: " + ", ast.Sub: " - ", ast.Mult: r" \, "}
-_SIGNS, _SIGNS_LATEX = ", e = +1 or -1", r", \quad \varepsilon = \pm 1"
-_SQUARED, _SQUARED_LATEX = "squared and added: ", r" \quad \text{(squared and added)}"
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """A formula as text and as LaTeX, the latter to stand in mathematics."""
-
-    text: str
-    latex: str
+_OPERATORS = {ast.Add: " + ", ast.Sub: " - ", ast.Mult: r" \, ", ast.MatMult: r" \times "}
+_PYTHON = (
+    (r"\+1 or -1", "pm*1"), (r"\+-", "pm*"), (r"\^", "**"), (" x ", "@"), (r"(\d)π", r"\1*π"),
+    (r"(?<=[\w)]) (?=[A-Za-z(])", "*"),
+)  # fmt: skip
+"""Abbreviations of formulas in print, and their Python."""
+_MATRICES = re.compile(r"((\d+T\d+|U0|T|[ZE](\^-1)?|1|=)( |$))+")
+_LETTERS = {"e": r"\varepsilon", "π": r"\pi", "pm": r"\pm", "theta": r"\theta"}
 
 
-@dataclass(frozen=True, slots=True)
-class Prose:
-    """Words as text and as LaTeX, the latter to stand outside mathematics."""
+def plain(markup: str) -> str:
+    """The text of markup."""
+    return markup.replace("$", "")
 
-    text: str
-    latex: str
+
+def display(rows: Sequence[str]) -> str:
+    """Rows of LaTeX in an environment of their own, aligned at their equals signs."""
+    aligned = " \\\\\n".join(row.replace(" = ", " &= ", 1) for row in rows)
+    return f"\\begin{{align*}}\n{aligned}\n\\end{{align*}}"
 
 
 class Typesetter:
-    """LaTeX of formulas and of sentences with formulas."""
+    """Writes LaTeX; ``symbols`` has the LaTeX of names."""
 
-    def formula(self, text: str) -> Line:
-        """An expression, or an equation with what stands before and behind it."""
-        body, after = text, ""
-        for mark, latex in ((_SIGNS, _SIGNS_LATEX), (_SQUARED, _SQUARED_LATEX)):
-            if mark in body:
-                body, after = body.replace(mark, ""), latex
-        body, colon, words = body.partition(": ")
-        if colon:
-            after = rf": \text{{{words}}}"
-        sides = re.split("( [=<>] )", body)
-        sides[::2] = [self._side(side) for side in sides[::2]]
-        return Line(text, "".join(sides) + after)
+    def __init__(self, symbols: Mapping[str, str]) -> None:
+        self.symbols = symbols
+
+    def prose(self, markup: str) -> str:
+        """A sentence, to stand outside mathematics."""
+        parts = markup.split("$")
+        parts[::2] = map(escaped, parts[::2])
+        parts[1::2] = [f"${self.formula(part)}$" for part in parts[1::2]]
+        return "".join(parts)
+
+    def rows(self, lines: Sequence[str]) -> str:
+        """Lines that are formulas, or words and formulas, in an environment of their own."""
+        every = [line.split("$") if "$" in line else ["", line] for line in lines]
+        for parts in every:
+            parts[::2] = [rf"\text{{{part}}}" if part else "" for part in parts[::2]]
+            parts[1::2] = map(self.formula, parts[1::2])
+        return display(["".join(parts) for parts in every])
+
+    def formula(self, text: str) -> str:
+        """A formula, to stand in mathematics."""
+        if _MATRICES.fullmatch(text):
+            latex = re.sub(r"(\d+)T(\d+)", r"{}^{\1}\\mathbf{T}_{\2}", text)
+            latex = re.sub(r"(?<!\{)\b([UZTE])(0?)(?=\b|\^)", r"\\mathbf{\1}_{\2}", latex)
+            latex = latex.replace("_{}", "").replace("^-1", "^{-1}")
+            return latex.replace(" ", r" \, ").replace(r" \, = \, ", " = ")
+        for words, python in _PYTHON:
+            text = re.sub(words, python, text)
+        sides = re.split("( [=<>] )", text)
+        sides[::2] = map(self._side, sides[::2])
+        return "".join(sides)
 
     def _side(self, text: str) -> str:
-        prime = "'" if text.endswith("'") else ""
         source = text.removesuffix("'")
-        wrapped = prime and source.startswith("(")
+        prime = text[len(source) :]
         tree = ast.parse(source, mode="eval").body
-        latex = self._node(tree, source.encode(), bare=not wrapped)
-        return latex + prime
+        return self._node(tree, source.encode(), bare=not prime) + prime
 
     def _node(self, node: ast.expr, source: bytes, bare: bool = False) -> str:
         """LaTeX of a node, in parentheses where its text is."""
@@ -68,87 +82,29 @@ class Typesetter:
                 return rf"\left({self._node(node, source, True)}\right)"
         if isinstance(node, ast.UnaryOp):
             return f"-{self._node(node.operand, source)}"
-        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div):
-            top, under = (self._node(part, source, True) for part in (node.left, node.right))
-            return rf"\frac{{{top}}}{{{under}}}"
-        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
-            base, power = self._node(node.left, source), self._node(node.right, source)
-            return f"{base}^{{{power}}}"
         if isinstance(node, ast.BinOp):
-            between = _OPERATORS[type(node.op)]
-            return self._node(node.left, source) + between + self._node(node.right, source)
+            is_fraction = isinstance(node.op, ast.Div)
+            a, b = (self._node(part, source, is_fraction) for part in (node.left, node.right))
+            if is_fraction or isinstance(node.op, ast.Pow):
+                return rf"\frac{{{a}}}{{{b}}}" if is_fraction else f"{a}^{{{b}}}"
+            return a + _OPERATORS[type(node.op)] + b
         if isinstance(node, ast.Call):
             assert isinstance(node.func, ast.Name)
-            arguments = ", ".join(self._node(a, source, True) for a in node.args)
-            if node.func.id == "sqrt":
-                return rf"\sqrt{{{arguments}}}"
-            if node.func.id == "atan2":
-                return rf"\operatorname{{atan2}}\left({arguments}\right)"
-            return rf"\{node.func.id}({arguments})"
+            name, arguments = node.func.id, [self._node(a, source, True) for a in node.args]
+            if name in "SC":  # of the angle i + j
+                return f"{name}_{{{arguments[0]}}}"
+            if name == "sqrt":
+                return rf"\sqrt{{{arguments[0]}}}"
+            function = rf"\operatorname{{{name}}}\left" if name == "atan2" else rf"\{name}\left"
+            return rf"{function}({', '.join(arguments)}\right)"
         if isinstance(node, ast.Name):
-            return self.symbol(node.id)
+            return self.symbols.get(node.id) or _letter(node.id)
         return powers(ast.get_source_segment(source.decode(), node) or "")
 
-    def symbol(self, name: str) -> str:
-        """A letter with its number as an index."""
-        greek = {"e": r"\varepsilon", "π": r"\pi"}
-        if name in greek:
-            return greek[name]
-        letters = name.rstrip("0123456789ij")
-        index = name[len(letters) :]
-        letters = letters.replace("θ", r"\theta")
-        return f"{letters}_{{{index}}}" if index else letters
 
-    def sentence(self, words: str, *parts: Line | Prose | str) -> Prose:
-        """A sentence; each ``{}`` of it is a formula or other words."""
-        pieces = words.split("{}")
-        text, latex = pieces[0], escaped(pieces[0])
-        for part, piece in zip(parts, pieces[1:], strict=True):
-            part = self.formula(part) if isinstance(part, str) else part
-            text += part.text + piece
-            latex += f"${part.latex}$" if isinstance(part, Line) else part.latex
-            latex += escaped(piece)
-        return Prose(text, latex)
-
-    def joined(self, parts: Sequence[Line | Prose | str], by: str) -> Prose:
-        """Formulas or words with something between them."""
-        return self.sentence(by.join(["{}"] * len(parts)), *parts)
-
-
-def number(value: float) -> str:
-    """A number with twelve digits."""
-    return f"{value:.12g}"
-
-
-def angle(value: float) -> str:
-    """A positive angle: a fraction of pi if it is one to rounding, else radians."""
-    ratio = Fraction(value / pi).limit_denominator(12)
-    if not ratio or abs(float(ratio) * pi - value) >= SMALLEST:
-        return number(value)
-    top = "π" if ratio.numerator == 1 else f"{ratio.numerator}π"
-    return top if ratio.denominator == 1 else f"{top}/{ratio.denominator}"
-
-
-def display(rows: Sequence[str]) -> str:
-    """Rows of LaTeX in an environment of their own, aligned at their equals signs."""
-    aligned = [re.sub(" ([=:]) |: ", lambda m: f" &{m[0].strip()} ", row, count=1) for row in rows]
-    return "\\begin{align*}\n" + " \\\\\n".join(aligned) + "\n\\end{align*}"
-
-
-def type_formula(words: str) -> Line:
-    """The formula of a type of equation, in the notation of the literature."""
-    latex = words.replace("+-", r"\pm ").replace("theta", r"\theta")
-    latex = re.sub(r"\bcos\(([^)]*)\)", r"\\cos(\1)", latex)
-    latex = re.sub(r"\bsin\(([^)]*)\)", r"\\sin(\1)", latex)
-    latex = re.sub(r"\b([SC])\(([^)]*)\)", r"\1_{\2}", latex)
-    latex = re.sub(r"\b([A-Za-z])(\d|[ij]\b)", r"\1_{\2}", latex)
-    latex = re.sub(r"(?<=[\w}]) (?=[A-Za-z])", r" \\, ", latex)
-    return Line(words, latex.replace(", ", r", \; ").replace(r"\, \; ", r"\, "))
-
-
-def matrices(words: str) -> Line:
-    """A product of matrices, or an equation between two."""
-    latex = re.sub(r"(\d+)T(\d+)", r"{}^{\1}\\mathbf{T}_{\2}", words)
-    latex = re.sub(r"(?<!\{)\b([UZTE])(0?)(?=\b|\^)", r"\\mathbf{\1}\2", latex)
-    latex = latex.replace("U}0", "U}_0").replace("^-1", "^{-1}").replace(" ", r" \, ")
-    return Line(words, latex.replace(r" \, = \, ", " = "))
+def _letter(name: str) -> str:
+    """A letter with its number as an index."""
+    letters = name.rstrip("0123456789ij") or name
+    index = name[len(letters) :]
+    latex = _LETTERS.get(letters, letters.replace("θ", r"\theta"))
+    return f"{latex}_{{{index}}}" if index else latex

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from itertools import groupby
 
-from .expressions import ONE, Expression, Graph, Kind
-from .typeset import number
+from .expressions import ONE, Expression, Graph, Kind, negative
 
 _RANK = {Kind.ONE: 0, Kind.JOINT: 1, Kind.NAMED: 1, Kind.POSE: 2, Kind.CONSTANT: 3, Kind.PRODUCT: 4,
          Kind.SUM: 5}  # fmt: skip
+
+
+def number(value: float) -> str:
+    """A number with twelve digits."""
+    return f"{value:.12g}"
 
 
 class Writer:
@@ -19,52 +23,35 @@ class Writer:
 
     def __call__(self, e: Expression) -> str:
         """An expression."""
-        if e[0] == 0.0:
-            return "0"
-        out = ""
-        for sign, words in self._terms(e):
-            if out:
-                out += f" {'-' if sign < 0 else '+'} {words}"
-            else:
-                out = f"-{words}" if sign < 0 else words
-        return out
+        return self.sum((e, ""))
 
-    def product(self, e: Expression, symbol: str) -> str:
-        """An expression times a symbol, with its sign in front."""
-        if e == (1.0, ONE):
-            return symbol
-        if e == (-1.0, ONE):
-            return f"-{symbol}"
-        terms = self._terms(e)
-        if len(terms) == 1:
-            sign, words = terms[0]
-            return f"{'-' if sign < 0 else ''}{words}*{symbol}"
-        sign = "-" if all(sign < 0 for sign, _ in terms) else ""
-        inner = self((-e[0], e[1])) if sign else self(e)
-        return f"{sign}({inner})*{symbol}"
-
-    def sum(self, terms: list[tuple[Expression, str]]) -> str:
+    def sum(self, *terms: tuple[Expression, str]) -> str:
         """Expressions times symbols (1 for an empty one), added."""
         out = ""
         for e, symbol in terms:
             if not e[0]:
                 continue
-            for words in [self.product(e, symbol)] if symbol else self._signed(e):
-                if not out:
-                    out = words
-                elif words.startswith("-"):
-                    out += f" - {words[1:]}"
+            for sign, words in [self._product(e, symbol)] if symbol else self._terms(e):
+                if out:
+                    out += f" {'-' if sign < 0 else '+'} {words}"
                 else:
-                    out += f" + {words}"
+                    out = f"-{words}" if sign < 0 else words
         return out or "0"
 
-    def _signed(self, e: Expression) -> list[str]:
-        return [("-" if sign < 0 else "") + words for sign, words in self._terms(e)]
+    def _product(self, e: Expression, symbol: str) -> tuple[int, str]:
+        """An expression times a symbol, with its sign."""
+        if e[1] == ONE and abs(e[0]) == 1.0:
+            return int(e[0]), symbol
+        terms = self._terms(e)
+        if len(terms) == 1:
+            return terms[0][0], f"{terms[0][1]}*{symbol}"
+        is_negative = all(sign < 0 for sign, _ in terms)
+        inner = self(negative(e) if is_negative else e)
+        return -1 if is_negative else 1, f"({inner})*{symbol}"
 
     def _terms(self, e: Expression) -> list[tuple[int, str]]:
         """Terms of a sum with their signs, a positive one first."""
-        flat = self._flat(e)
-        flat.sort(key=lambda t: self._order(t[1]))
+        flat = sorted(self._flat(e), key=lambda t: self._order(t[1]))
         lead = next((i for i, t in enumerate(flat) if t[0] > 0), 0)
         if lead and not self._nested(flat[0][1]):
             flat.insert(0, flat.pop(lead))
@@ -72,17 +59,12 @@ class Writer:
 
     def _nested(self, number: int) -> bool:
         """Whether a sum is in it: such a term stays in front with its minus, as in the book."""
-        node = self.graph.nodes[number]
-        if node.kind is Kind.PRODUCT:
-            parts = {n for _, n in node.parts}
-            return len(parts) > 1 and any(self._is_sum(n) for n in parts)
-        return False
-
-    def _is_sum(self, number: int) -> bool:
-        node = self.graph.nodes[number]
-        if node.kind is Kind.NAMED:
-            return node.name.startswith("B")
-        return node.kind is Kind.SUM
+        nodes, node = self.graph.nodes, self.graph.nodes[number]
+        parts = {n for _, n in node.parts} if node.kind is Kind.PRODUCT else set()
+        return len(parts) > 1 and any(
+            nodes[n].kind is Kind.SUM or (nodes[n].kind is Kind.NAMED and nodes[n].name[0] == "B")
+            for n in parts
+        )
 
     def _flat(self, e: Expression) -> list[Expression]:
         factor, number = e
@@ -93,20 +75,16 @@ class Writer:
 
     def _order(self, number: int) -> tuple[int, int, int, str]:
         """Terms with x before those with y and z, the constants behind them."""
-        poses = sorted(self._poses(number))
-        node = self.graph.nodes[number]
-        first = poses[0] if poses else (9, "")
-        return (first[0], -self.graph.leaves((1.0, number)), _RANK[node.kind], first[1])
+        axis, column = min(self._poses(number), default=(9, ""))
+        return axis, -self.graph.leaves((1.0, number)), _RANK[self.graph.nodes[number].kind], column
 
     def _poses(self, number: int) -> list[tuple[int, str]]:
         node = self.graph.nodes[number]
         if node.kind is Kind.POSE:
             return [("xyz".index(node.name[1]), node.name[0])]
-        if node.kind is Kind.NAMED and node.name.startswith("B"):
-            return self._poses(node.parts[0][1])
-        return [p for _, n in node.parts for p in self._poses(n)] if node.kind in (
-            Kind.SUM, Kind.PRODUCT
-        ) else []  # fmt: skip
+        if node.kind is Kind.NAMED and node.name[0] != "B":
+            return []
+        return [p for _, n in node.parts for p in self._poses(n)]
 
     def _term(self, factor: float, node: int) -> str:
         item = self.graph.nodes[node]
