@@ -8,6 +8,7 @@ joint variable takes up as an offset.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan2, cos, hypot, pi, sin
 
@@ -60,7 +61,7 @@ class NormalForm:
         return np.array([row.sigma for row in self.rows], dtype=np.int64)
 
 
-def normal_form(chain: JointChain, frames: tuple[int, ...]) -> NormalForm:
+def normal_form(chain: JointChain, frames: Sequence[int]) -> NormalForm:
     """Rows of a chain; ``frames`` are the numbers of its frames in the table.
 
     Axes that are parallel, perpendicular or meet to 1e-9 rad or m count as such.

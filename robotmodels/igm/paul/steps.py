@@ -96,11 +96,11 @@ class PlanText:
 
     def step(self, number: int, step: Step) -> ExplainedStep:
         """One step in words."""
-        symbols = [[self.graph.nodes[e[1]].name for e in self.joints.symbols(u)]
-                   for u in step.unknowns]  # fmt: skip
+        nodes, symbols = self.graph.nodes, [self.joints.symbols(u) for u in step.unknowns]
         page = Page(
             self, step.type.formula, step.coefficients, step.unknowns,
-            tuple(map(self.unknown, step.unknowns)), *zip(*symbols, strict=True),
+            tuple(map(self.unknown, step.unknowns)),
+            tuple(nodes[C[1]].name for C, _ in symbols), tuple(nodes[S[1]].name for _, S in symbols),
         )  # fmt: skip
         step.type.write(page)
         formulas = [*page.formulas, *self._derived(number)]
@@ -186,7 +186,8 @@ class PlanText:
 
     def _which(self, step: Step, first: str) -> str:
         """Which of the two solutions has which sign of the sine that follows."""
-        other = positive_sine(step.unknowns[0], *step.coefficients, self.joints)
+        X, Y = step.coefficients
+        other = positive_sine(step.unknowns[0], X, Y, self.joints)
         if other is None:
             return ""
         frame, name = self.joints.row(other[0]).frame, first.strip("$")
