@@ -100,7 +100,8 @@ class PlanText:
         page = Page(
             self, step.type.formula, step.coefficients, step.unknowns,
             tuple(map(self.unknown, step.unknowns)),
-            tuple(nodes[C[1]].name for C, _ in symbols), tuple(nodes[S[1]].name for _, S in symbols),
+            tuple(nodes[C[1]].name for C, _ in symbols),
+            tuple(nodes[S[1]].name for _, S in symbols),
         )  # fmt: skip
         step.type.write(page)
         formulas = [*page.formulas, *self._derived(number)]
