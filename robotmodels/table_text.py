@@ -33,7 +33,7 @@ def boxed(columns: list[tuple[str, list[str]]]) -> str:
 
 def joints_text(columns: Mapping[str, Iterable[float]]) -> str:
     """Box with one line a joint and a column for each quantity."""
-    cells = [(name, [f"{x:.6g}" for x in values]) for name, values in columns.items()]
+    cells = [(name, [f"{x + 0.0:.6g}" for x in values]) for name, values in columns.items()]
     return boxed([("j", [str(j + 1) for j in range(len(cells[0][1]))]), *cells])
 
 

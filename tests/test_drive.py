@@ -25,6 +25,7 @@ def tx40(**terms):
 def test_tx40_wrist_couples_motor_6_only():
     wrist = tx40()
     assert wrist.coupled_motors == (6,)
+    assert "coupled motors: 6." in str(wrist)
     wanted = np.eye(6)
     wanted[5, 4] = 1.0  # the shaft of motor 6 turns with joints 5 and 6 together
     assert np.allclose(wrist.weights, wanted, atol=1e-15)
@@ -75,6 +76,7 @@ def test_mimic_joints_are_singular_and_ranks_do_not_depend_on_units():
     """Joint 2 follows joint 1: q has no unique encoder variables, but torques still go over."""
     gripper = rm.Transmission([[1, 0], [-1, 0]], offset=[0, 0.1])
     assert gripper.coupled_motors == ()
+    assert "joints mimic others" in str(gripper)
     assert gripper.to_joint([0.3, 7.0]) == pytest.approx([0.3, -0.2])
     assert gripper.to_motor_torque([2.0, 0.5]) == pytest.approx([1.5, 0.0])
     with pytest.raises(InvalidValueError, match="a joint mimics another one"):

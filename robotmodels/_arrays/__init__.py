@@ -3,7 +3,7 @@
 Leading axes are batch axes and broadcast against each other; the last axes are the core.
 """
 
-from .batch import batch_rows, batch_shape
+from .batch import batch_rows, batch_shape, check_same_length
 from .border import (
     LARGEST,
     Array,
@@ -38,6 +38,7 @@ __all__ = [
     "as_vector",
     "batch_rows",
     "batch_shape",
+    "check_same_length",
     "read_only",
     "same_value",
     "value_hash",

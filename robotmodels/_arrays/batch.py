@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ..errors import ShapeError
@@ -36,3 +38,12 @@ def batch_rows(
         for a in arrays
     ]
     return batch, rows
+
+
+def check_same_length(arrays: Mapping[str, Array], what: str) -> int:
+    """Number of joints of arrays that have one number for each."""
+    shape = next(iter(arrays.values())).shape
+    if len(shape) != 1 or any(array.shape != shape for array in arrays.values()):
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        raise ShapeError(f"{what} parameters are all of shape (n,), got {shapes}.")
+    return shape[0]

@@ -13,9 +13,9 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import LARGEST, Array, Value, as_bounded, read_only
+from .._arrays import LARGEST, Array, Value, as_bounded, check_same_length, read_only
 from .._choices import chosen
-from ..errors import InertiaError, InvalidValueError, ShapeError
+from ..errors import InertiaError, InvalidValueError
 from ..table_text import joints_text
 
 
@@ -106,12 +106,9 @@ class DriveParameters(Value):
         values = {name: as_bounded(v, name, LARGEST) for name, v in given.items() if v is not None}
         if not values:
             raise InertiaError("Give at least one of Ia, Fv, Fc, offset, each of shape (n,).")
-        shape = next(iter(values.values())).shape
-        if len(shape) != 1 or any(array.shape != shape for array in values.values()):
-            shapes = ", ".join(f"{name} {array.shape}" for name, array in values.items())
-            raise ShapeError(f"Drive parameters are all of shape (n,), got {shapes}.")
+        zero = np.zeros(check_same_length(values, "Drive"))
         for name in given:
-            object.__setattr__(self, name, read_only(values.get(name, np.zeros(shape))))
+            object.__setattr__(self, name, read_only(values.get(name, zero)))
 
     def __str__(self) -> str:
         return joints_text({key: getattr(self, key) for key in ("Ia", "Fv", "Fc", "offset")})

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, Value, as_exact, as_floats, as_vector, read_only
 from ..errors import InertiaError, InvalidValueError, ShapeError
+from ..table_text import joints_text
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
@@ -48,9 +49,9 @@ class Transmission(Value):
 
     Examples
     --------
-    >>> wrist = Transmission([[1 / 45, 0], [-1 / 45, 1 / 32]])
-    >>> wrist.coupled_motors, wrist.to_joint([45.0, 0.0])
-    ((2,), array([ 1., -1.]))
+    >>> wrist = Transmission.from_motor([[45.0, 0.0], [32.0, 32.0]], Iam=[0.0, 0.01])
+    >>> wrist.coupled_motors, wrist.to_encoder([1.0, 0.0]), wrist.to_motor_torque([77.0, 32.0])
+    ((2,), array([45., 32.]), array([1., 1.]))
     """
 
     matrix: Array
@@ -95,12 +96,6 @@ class Transmission(Value):
 
         Row m of R (n, n) has the turns of motor m per turn of each joint; other arguments as for
         the class.
-
-        Examples
-        --------
-        >>> wrist = Transmission.from_motor([[45.0, 0.0], [32.0, 32.0]], Iam=[0.0, 0.01])
-        >>> wrist.to_encoder([1.0, 0.0]), wrist.to_motor_torque([77.0, 32.0])
-        (array([45., 32.]), array([1., 1.]))
         """
         R = _square(matrix)
         n = len(R)
@@ -154,6 +149,15 @@ class Transmission(Value):
     def coupled_motors(self) -> tuple[int, ...]:
         """Numbers (from 1) of the coupled motors (turned by more than one joint)."""
         return tuple(int(m) + 1 for m in np.flatnonzero((self.weights != 0.0).sum(axis=1) > 1))
+
+    def __str__(self) -> str:
+        form = "joints mimic others" if self.is_mimicry else "K is singular"
+        if self.is_invertible:
+            form = f"coupled motors: {', '.join(map(str, self.coupled_motors)) or 'none'}"
+        columns = {f"K {m + 1}": column for m, column in enumerate(self.matrix.T) if column.any()}
+        terms = {name: getattr(self, name) for name in ("offset", "Iam", "Fvm", "Fcm")}
+        shown = {"offset": self.offset} | {k: x for k, x in terms.items() if x.any()}
+        return f"q = K q_c + offset of {self.n} joints; {form}.\n{joints_text(columns | shown)}"
 
     def to_joint(self, q_c: ArrayLike) -> Array:
         """Joint variables ``q = K q_c + q_0`` of encoder variables, both (..., n)."""

@@ -36,9 +36,9 @@ def ddm(
     drive: bool = True,
     friction: Friction | None = None,
 ) -> Array:
-    """Direct dynamic model: joint accelerations under given torques, the inverse of `idm`.
+    """Direct (forward) dynamic model: joint accelerations under torques, the inverse of `idm`.
 
-    Also called forward dynamics. Mimic joints follow, and ``K^T tau`` is that of ``idm``.
+    Mimic joints follow, and ``K^T tau`` is that of ``idm``.
 
     Parameters
     ----------
@@ -71,12 +71,11 @@ def ddm(
 
     Examples
     --------
-    >>> from robotmodels.geometry import DHTable
-    >>> from robotmodels.inertia import InertialParameters
-    >>> link = InertialParameters.from_com([2.0], [[0.1, 0, 0]], [np.zeros((3, 3))])
-    >>> pendulum = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]), link)
-    >>> ddm(pendulum, [0.0], [0.0], [0.04]).round(12)
-    array([2.])
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.robots import load
+    >>> arm, q, v, a = load("puma560"), *np.ones((3, 6))
+    >>> bool(np.allclose(ddm(arm, q, v, idm(arm, q, v, a)), a))
+    True
     """
     check_model(model)
     check_all_or_none(drive)
@@ -125,9 +124,8 @@ def free_motion(transmission: Transmission) -> Array | None:
         n, rank = transmission.n, transmission.rank
         raise InvalidValueError(
             f"transmission: the coupling matrix K is singular, it has rank {rank} of {n}, so that "
-            "motor torques do not determine the motion. Correct it, or remove it with "
-            "model.with_transmission(None). For mimic joints, the columns of their motors are "
-            "zero, as RobotModel.from_urdf(..., mimic=True) makes them."
+            "motor torques do not determine the motion. Correct it (columns of mimic joints are "
+            "zero), or remove it with model.with_transmission(None)."
         )
     G = transmission.free
     return G / np.linalg.norm(G, axis=0)
@@ -145,12 +143,10 @@ def check_follows(model: RobotModel, free: Array, q: Array, v: Array) -> None:
         size = 1.0 + np.abs(values).max(axis=-1, initial=0.0, keepdims=True)
         if (away > _FOLLOWS * size).any():
             j = int(np.argmax(away.reshape(-1, model.n).max(axis=0)))
-            shift = "" if name == "q" else " - transmission.offset"
             raise InvalidValueError(
                 f"{name}: the joints of {model.name!r} that mimic others do not follow them here "
-                f"(joint {j + 1} is off by {away[..., j].max():.3g}). Take "
-                f"{name} = model.transmission.to_joint({name}_c){shift} of the encoder variables, "
-                "or model.with_transmission(None) to let all joints move independently."
+                f"(joint {j + 1} is off by {away[..., j].max():.3g}). Map encoder variables by "
+                "model.transmission (to_joint, matrix), or take model.with_transmission(None)."
             )
 
 
@@ -182,23 +178,23 @@ def mass_matrix_error(
     Shapes: M (m, m), free (n, m).
     """
     title = f"the mass matrix of {model.name!r} is"
-    advice = (
-        "Give inertial parameters with model.with_inertia(...), or rotor inertias Ia with "
-        "model.with_drive(...)."
-    )
+    advice = "Give inertial parameters (with_inertia), or rotor inertias Ia (with_drive)."
     if not np.isfinite(M).all():
         return SingularMassMatrixError(f"{title} singular{where}: its entries overflow. {advice}")
     m, size = len(M), unit_sizes(M)
     values, vectors = np.linalg.eigh(M / (size[:, None] * size))
     if values[0] < -rounding(m):
-        links = model.inertia.consistency().not_physical
-        rotors = f"Check the rotor inertias Ia = {model.drive.Ia.tolist()}" if drive else ""
-        if drive and model.transmission is not None and model.transmission.Iam.any():
-            rotors += f" and, of coupled motors, Iam = {model.transmission.Iam.tolist()}"
+        reasons = []
+        if links := model.inertia.consistency().not_physical:
+            reasons.append(f"Not physical: {links}.")
+        if drive:
+            coupled = np.zeros(0) if model.transmission is None else model.transmission.Iam
+            more = f" and, of coupled motors, Iam = {coupled.tolist()}" if coupled.any() else ""
+            reasons.append(f"Check the rotor inertias Ia = {model.drive.Ia.tolist()}{more}.")
         return InertiaError(
             f"{title} not positive definite{where}: {(values < 0.0).sum()} of its {m} eigenvalues "
-            f"are negative. {f'Not physical: {links}. ' * bool(links)}{rotors + '. ' * drive}"
-            "Correct these parameters; standard_parameters(...) finds the nearest physical ones."
+            f"are negative. {' '.join(reasons)} Correct these parameters; standard_parameters(...) "
+            "finds the nearest physical ones."
         )
     null = vectors[:, values <= max(rounding(m), values[0])] / size[:, None]
     motion = np.abs(null if free is None else free @ null).max(axis=1)

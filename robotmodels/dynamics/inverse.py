@@ -30,9 +30,7 @@ def idm(
     drive: bool = True,
     friction: Friction | None = None,
 ) -> Array:
-    """Inverse dynamic model: joint torques of a motion.
-
-    Also called inverse dynamics, ``rnea``, ``rne``.
+    """Inverse dynamic model (``rnea``, ``rne``): joint torques of a motion.
 
     ``tau = M(q) a + C(q, v) v + g(q) + J^T wrench + Ia a + Fv v + Fc sign(v) + offset + friction``
 
@@ -75,13 +73,9 @@ def idm(
 
     Examples
     --------
-    >>> from robotmodels.geometry import DHTable
-    >>> from robotmodels.inertia import InertialParameters
-    >>> link = InertialParameters.from_com([2.0], [[0.1, 0, 0]], [np.zeros((3, 3))])
-    >>> pendulum = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]), link,
-    ...                                  gravity=(0, -9.81, 0))
-    >>> idm(pendulum, [0.0], [0.0], [0.0])
-    array([1.962])
+    >>> from robotmodels.robots import load
+    >>> idm(load("puma560"), [0.0] * 6).round(2)
+    array([ 0.  , 37.48,  0.25,  0.  ,  0.  ,  0.  ])
     """
     check_model(model)
     check_all_or_none(drive)

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_floats, as_vector, read_only
+from .._arrays import Array, as_each, as_floats, as_vector, read_only
 from ..errors import InvalidValueError, ShapeError
 from .models import JointFriction
 
@@ -26,9 +26,8 @@ class GravityCompensator(JointFriction):
     ``tau = (Kc l + Pc) dl/dq``. Without geometry it is a Fourier series of the angle:
     ``tau = Gs sin(q) + Gc cos(q) + Gss sin(2 q) + Gcc cos(2 q)``.
 
-    It dissipates no energy. Where gravity turns a link as a compensator does, base parameters
-    regroup ``Kc``, ``Gs`` and ``Gc`` into first moments of the link: only their sum is
-    identifiable.
+    It dissipates no energy. Base parameters regroup ``Kc``, ``Gs`` and ``Gc`` into the first
+    moments of a link that gravity turns in the same way.
 
     Parameters
     ----------
@@ -73,23 +72,23 @@ class GravityCompensator(JointFriction):
                 f"joints: expected different numbers from 1 to {n}, got {joints!r:.60}."
             )
         k, geometry = numbers.size, {"a": a, "b": b, "phi": phi}
-        missing = [name for name, value in geometry.items() if value is None]
-        if 0 < len(missing) < 3:
+        if len({value is None for value in geometry.values()}) > 1:
             raise InvalidValueError(
-                f"{missing[0]}: expected a, b and phi together; leave out all three where the "
-                "geometry is not known."
+                "a, b, phi: expected all three, or none where the geometry is not known."
             )
         set_ = object.__setattr__
         set_(self, "n", int(n))
         set_(self, "joints", read_only(numbers, np.int64))
         for name, value in geometry.items():
-            lengths = None if value is None else _spread(value, (k,), name)
-            if lengths is not None and name != "phi" and (lengths <= 0.0).any():
-                raise InvalidValueError(f"{name}: expected positive metres, got {lengths.min()}.")
-            set_(self, name, lengths)
-        rows = np.zeros(len(self.kinds)) if values is None else as_floats(values, "values")
-        rows = rows[:, None] if rows.ndim == 1 else rows
-        set_(self, "values", _spread(rows, (len(self.kinds), k), "values"))
+            above = -np.inf if name == "phi" else 0.0
+            if value is not None:
+                value = read_only(as_each(value, k, name, above=above, finite=True))
+            set_(self, name, value)
+        m = len(self.kinds)
+        rows = np.zeros(m) if values is None else as_floats(values, "values")
+        if rows.shape not in ((m,), (m, k)):
+            raise ShapeError(f"values: expected shape ({m},) or ({m}, {k}), got {rows.shape}.")
+        set_(self, "values", read_only(np.broadcast_to(rows.reshape(m, -1), (m, k))))
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -127,15 +126,3 @@ class GravityCompensator(JointFriction):
         out = np.zeros((*columns.shape[:-1], self.n))
         out[..., self.joints - 1] = columns
         return out
-
-
-def _spread(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
-    """One for each joint that has one, or the same for all."""
-    given = as_floats(value, name)
-    try:
-        return read_only(np.broadcast_to(given, shape))
-    except ValueError:
-        raise ShapeError(
-            f"{name}: expected shape {shape}, the last axis for the joints that have one, got "
-            f"{np.shape(value)}."
-        ) from None

@@ -26,6 +26,14 @@ References
 Book section 1.5.1.4; B. Armstrong-Helouvry, P. Dupont and C. Canudas de Wit, "A survey of
 models, analysis tools and compensation methods for the control of machines with friction",
 Automatica 30(7), 1994, section 2.
+
+Examples
+--------
+>>> gears = AsymmetricFriction(Fvp=[1.0], Fcp=[2.0], Fvn=[3.0], Fcn=[4.0])
+>>> gears.torque([[1.0], [0.0], [-1.0]]).ravel()
+array([ 3.,  0., -7.])
+>>> (StribeckFriction([0.0], [1.0], [1.5], vs=[0.01]) + TorqueOffset([0.5])).torque([1e-9])
+array([2.])
 """
 
 from __future__ import annotations
@@ -37,7 +45,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Rebuilt, Value, as_floats, as_vector, read_only
+from .._arrays import Array, Rebuilt, Value, as_floats, as_vector, check_same_length, read_only
 from ..errors import InvalidValueError, ShapeError
 from .protocols import FrictionSum, together, torques_at_rest
 
@@ -51,10 +59,7 @@ class JointFriction(Value, ABC):
     def __post_init__(self) -> None:
         names = [field.name for field in fields(self)]
         values = {name: as_floats(getattr(self, name), name) for name in names}
-        shape = next(iter(values.values())).shape
-        if len(shape) != 1 or any(array.shape != shape for array in values.values()):
-            shapes = ", ".join(f"{name} {array.shape}" for name, array in values.items())
-            raise ShapeError(f"Friction parameters are all of shape (n,), got {shapes}.")
+        check_same_length(values, "Friction")
         for name, array in values.items():
             object.__setattr__(self, name, read_only(array))
 
@@ -90,13 +95,7 @@ class JointFriction(Value, ABC):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViscousFriction(JointFriction):
-    """Viscous friction, ``tau = Fv v``.
-
-    Examples
-    --------
-    >>> ViscousFriction([2.0]).torque([-0.5])
-    array([-1.])
-    """
+    """Viscous friction, ``tau = Fv v``."""
 
     kinds: ClassVar[tuple[str, ...]] = ("Fv",)
     Fv: Any
@@ -108,13 +107,7 @@ class ViscousFriction(JointFriction):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoulombFriction(JointFriction):
-    """Coulomb (dry) friction, ``tau = Fc sign(v)``.
-
-    Examples
-    --------
-    >>> CoulombFriction([2.0]).torque([[-0.5], [0.0], [3.0]]).ravel()
-    array([-2.,  0.,  2.])
-    """
+    """Coulomb (dry) friction, ``tau = Fc sign(v)``."""
 
     kinds: ClassVar[tuple[str, ...]] = ("Fc",)
     Fc: Any
@@ -126,13 +119,7 @@ class CoulombFriction(JointFriction):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TorqueOffset(JointFriction):
-    """Constant torque, as of friction that differs by direction or of an amplifier.
-
-    Examples
-    --------
-    >>> TorqueOffset([2.0]).torque([-0.5])
-    array([2.])
-    """
+    """Constant torque, as of friction that differs by direction or of an amplifier."""
 
     kinds: ClassVar[tuple[str, ...]] = ("offset",)
     offset: Any
@@ -148,12 +135,6 @@ class AsymmetricFriction(JointFriction):
 
     ``tau = Fvp v + Fcp`` for v > 0, ``tau = Fvn v - Fcn`` for v < 0: positive numbers dissipate in
     both directions.
-
-    Examples
-    --------
-    >>> gears = AsymmetricFriction(Fvp=[1.0], Fcp=[2.0], Fvn=[3.0], Fcn=[4.0])
-    >>> gears.torque([[1.0], [-1.0]]).ravel()
-    array([ 3., -7.])
     """
 
     kinds: ClassVar[tuple[str, ...]] = ("Fvp", "Fcp", "Fvn", "Fcn")
@@ -184,12 +165,6 @@ class StribeckFriction(JointFriction):
         Stribeck velocity, positive, rad/s or m/s.
     exponent : array_like, shape (n,), optional
         Positive, default 2 for every joint.
-
-    Examples
-    --------
-    >>> slide = StribeckFriction(Fv=[0.0], Fc=[1.0], Fs=[1.5], vs=[0.01])
-    >>> slide.torque([[1e-9], [1.0]]).ravel()
-    array([1.5, 1. ])
     """
 
     kinds: ClassVar[tuple[str, ...]] = ("Fv", "Fc", "Fs")

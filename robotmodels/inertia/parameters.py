@@ -83,8 +83,7 @@ class InertialParameters(Value):
                 f"expected com of shape ({f}, 3) and inertia of shape ({f}, 3, 3) for {f} masses, "
                 f"got {com.shape} and {tensor.shape}."
             )
-        if (mass < 0).any():
-            j = int(np.flatnonzero(mass < 0)[0])
+        for j in np.flatnonzero(mass < 0)[:1]:
             raise InertiaError(
                 f"Link {j + 1}: a mass cannot be negative, got {mass[j]} kg. Identified sets that "
                 "are not physical are given as InertialParameters(values)."

@@ -167,10 +167,10 @@ def dry_friction(model: RobotModel, drive: bool, friction: Friction | None) -> D
 
 def check_dissipates(dry: DryFriction) -> None:
     """Raise for dry friction that adds energy."""
-    for k in np.flatnonzero(dry.lower > dry.upper):
-        what = "coupled motor" if dry.motor[k] else "joint"
+    for k in np.flatnonzero(dry.lower > dry.upper)[:1]:
+        part = f"{'coupled motor' if dry.motor[k] else 'joint'} {int(dry.joint[k]) + 1}"
         raise InvalidValueError(
-            f"friction: the dry friction of {what} {int(dry.joint[k]) + 1} is negative "
+            f"friction: the dry friction of {part} is negative "
             f"({0.5 * (dry.upper[k] - dry.lower[k]):.6g}): it would accelerate the joint out of "
             "rest. Repair Fc (an identified value may be noise about zero), or give smoothing=."
         )

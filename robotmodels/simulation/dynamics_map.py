@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Frozen, as_exact, as_floats
+from .._arrays import Array, Frozen, as_each, as_exact, as_floats
 from ..dynamics import gravity_torque, mass_matrix
 from ..errors import InvalidValueError
 from ..geometry import PRISMATIC
@@ -80,16 +80,14 @@ def dynamics_map(
     Examples
     --------
     >>> from robotmodels.robots import load
-    >>> grid = dynamics_map(load("rx90"), (1, 2), samples=(3, 4))
-    >>> grid.mass.shape, grid.gravity.shape
-    ((3, 4, 6, 6), (3, 4, 6))
+    >>> dynamics_map(load("rx90"), (1, 2), samples=(3, 4)).mass.shape
+    (3, 4, 6, 6)
     """
     check_model(model)
     n, columns = model.n, np.atleast_1d(np.asarray(joints))
     k = columns.size
-    if not (columns.dtype.kind in "iu" and columns.shape in ((1,), (2,))) or (
-        len(set(columns.tolist())) != k or columns.min() < 0 or columns.max() >= n
-    ):
+    known = columns.dtype.kind in "iu" and len({*columns.tolist()} & {*range(n)}) == k
+    if columns.shape not in ((1,), (2,)) or not known:
         raise InvalidValueError(
             f"joints: expected one or two different joints, numbers from 0 to {n - 1}, got "
             f"{joints!r:.60}."
@@ -106,10 +104,8 @@ def dynamics_map(
         ends = as_exact(given[None] if k == given.ndim == 1 else given, (k, 2), "ranges")
     if (ends[:, 0] >= ends[:, 1]).any():
         raise InvalidValueError(f"ranges: expected ascending ends, got {ends.tolist()}.")
-    counts = np.asarray((181 if k == 1 else 61) if samples is None else samples)
-    if counts.dtype.kind not in "iu" or counts.shape not in ((), (k,)) or counts.min() < 2:
-        raise InvalidValueError(f"samples: expected {k} whole numbers from 2, got {samples!r:.60}.")
-    sizes = np.broadcast_to(counts, (k,)).tolist()
+    counts = as_each(samples, k, "samples", least=2.0, finite=True, default=181 if k == 1 else 61)
+    sizes = counts.astype(int).tolist()
     values = [np.linspace(a, b, size) for (a, b), size in zip(ends, sizes, strict=True)]
     grid = np.broadcast_to(base, (*sizes, n)).copy()
     for j, column in zip(columns, np.meshgrid(*values, indexing="ij"), strict=True):

@@ -53,7 +53,7 @@ def simulate(
     Dry friction (Fc of the drives, Fcm of coupled motors, jumps at rest of a friction model) is
     exact: a part that comes to rest is held as long as the torque on it stays within its breakaway
     torques, and each change is an event at which the integration starts anew. Energies and works
-    are integrated along: the drift of their balance measures the error of the integration.
+    are integrated along: the drift of their balance measures the error.
 
     Parameters
     ----------
@@ -94,9 +94,8 @@ def simulate(
     progress : bool or callable, optional
         A function is called with the fraction done; True writes it to the log (`logging`).
     period, delay : float, optional
-        Sampling period of the control, s: its torques are held between samples, its state advances
-        by Euler steps (default: continuous); time from a sample to its torque, s, zero torque
-        before the first.
+        Sampling period of the control, s (default: continuous): its torques are held between
+        samples, its state advances by Euler steps; time from a sample to its torque, s.
 
     Returns
     -------
@@ -178,18 +177,13 @@ def followed(
     """The motion of an integration from a state (n,), with its energies."""
     with np.errstate(over="ignore", invalid="ignore"):  # an unbounded motion is a status
         run.follow(q, v, cuts)
-    q, v, a, tau, taken, sticks, works, state = (np.array(x) for x in zip(*run.rows, strict=True))
-    kinetic, potential = kinetic_energy(model, q, v, drive), potential_energy(model, q)
-    return Simulation(
-        *(model, np.array(run.t), q, v, a, tau, taken, sticks, kinetic, potential),
-        *works.T.copy(),
-        drive=bool(drive),
-        events=tuple(run.events),
-        status=run.status,
-        evaluations=run.motion.evaluations,
-        steps=run.steps,
-        state=state,
+    q, v, *loads, works, state = (np.array(x) for x in zip(*run.rows, strict=True))
+    energies = kinetic_energy(model, q, v, drive), potential_energy(model, q)
+    fields: Any = (
+        *(model, np.array(run.t), q, v, *loads, *energies, *works.T.copy(), bool(drive)),
+        *(tuple(run.events), run.status, run.motion.evaluations, run.steps, state),
     )
+    return Simulation(*fields)
 
 
 def law_of(law: Any, size: int, t: Array | None, name: str) -> tuple[Any, Array]:
@@ -230,10 +224,9 @@ def times_of(t: ArrayLike) -> tuple[float, float, Array | None]:
 
 def _limits(model: RobotModel, q: Array) -> tuple[Array, Array]:
     lower, upper = model.lower, model.upper
-    if lower.size and not (np.isfinite(lower) | np.isfinite(upper)).any():
+    if not (np.isfinite(lower) | np.isfinite(upper)).any():
         raise InvalidValueError(
-            f"stop_at_limits: no joint of {model.name!r} has a finite limit; give the table "
-            "lower= and upper=, or leave stop_at_limits out."
+            f"stop_at_limits: no joint of {model.name!r} has a finite limit; give the table some."
         )
     for j in np.flatnonzero((q < lower) | (q > upper))[:1]:
         raise InvalidValueError(

@@ -1,4 +1,17 @@
-"""Decomposition of the torques of a motion (book sections 1.5.1.1 to 1.5.1.5)."""
+"""Decomposition of the torques of a motion (book sections 1.5.1.1 to 1.5.1.5).
+
+Parameters
+----------
+model, q, v, a, wrench, drive, friction
+    As for `idm`: q, v, a (..., n) of at least one sample.
+simulation : Simulation
+    Result of `simulate`.
+
+Returns
+-------
+TorqueParts
+    Arrays of the shape of q.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Frozen, as_vector, batch_shape
+from .._arrays import Array, Frozen, as_vector, batch_rows
 from ..drive import check_all_or_none
 from ..dynamics import gravity_torque
 from ..dynamics.inverse import motion_torques
@@ -52,16 +65,6 @@ def torque_parts(
 ) -> TorqueParts:
     """Split the torques of a motion into inertia, Coriolis, gravity, friction and wrench.
 
-    Parameters
-    ----------
-    model, q, v, a, wrench, drive, friction
-        As for `idm`: q, v, a (..., n) of at least one sample.
-
-    Returns
-    -------
-    TorqueParts
-        Arrays (..., n) of all of them.
-
     Examples
     --------
     >>> from robotmodels.dynamics import idm
@@ -72,42 +75,31 @@ def torque_parts(
     """
     check_model(model)
     check_all_or_none(drive)
-    n = model.n
-    arrays = {"q": as_vector(q, n, "q"), "v": as_vector(v, n, "v"), "a": as_vector(a, n, "a")}
-    if wrench is not None:
-        arrays["wrench"] = as_vector(wrench, 6, "wrench")
-    batch = batch_shape(tuple(arrays.values()), tuple(arrays))
-    if 0 in batch:
+    n, names = model.n, ("q", "v", "a") if wrench is None else ("q", "v", "a", "wrench")
+    given = zip(names, (q, v, a, wrench), (n, n, n, 6), strict=False)
+    batch, rows = batch_rows(tuple(as_vector(x, k, name) for name, x, k in given), names)  # type: ignore[arg-type]
+    if not len(rows[0]):
         raise InvalidValueError("q, v, a: the motion is empty; expected at least one sample.")
-    q, v, a = (np.broadcast_to(arrays[name], (*batch, n)) for name in "qva")
-    tool = still = taken = np.zeros((*batch, n))
+    q, v, a, *tool = (row.reshape(*batch, -1) for row in rows)
+    still = taken = pull = np.zeros_like(q)
     # separate calls, so that no part loses digits to a larger one
     weightless = model.with_gravity(np.zeros(3))
     inertia = motion_torques(weightless, q, still, a, drive=False)
-    drives = model.drive_matrices if drive else None
-    if drives is not None:
+    if drive and (drives := model.drive_matrices) is not None:
         inertia = inertia + a @ drives.rotor
         taken = drives.torque(v, None)
     if friction is not None:
         taken = taken + torque_at(check_friction(friction, n), v, q)
-    if wrench is not None:
-        tool = motion_torques(weightless, q, still, still, wrench=arrays["wrench"], drive=False)
+    if tool:
+        pull = motion_torques(weightless, q, still, still, wrench=tool[0], drive=False)
     coriolis = motion_torques(weightless, q, v, still, drive=False)
-    return TorqueParts(inertia, coriolis, gravity_torque(model, q), taken, tool)
+    return TorqueParts(inertia, coriolis, gravity_torque(model, q), taken, pull)
 
 
 def simulated_torque_parts(simulation: Simulation) -> TorqueParts:
-    """Split the torques of a simulated motion, including friction of sticking joints.
+    """Split the torques of a simulated motion (N samples), with the friction of sticking joints.
 
-    Parameters
-    ----------
-    simulation : Simulation
-        Result of `simulate`, N samples.
-
-    Returns
-    -------
-    TorqueParts
-        Arrays (N, n); the total is the torque of the control.
+    The total, (N, n), is the torque of the control.
     """
     if not isinstance(simulation, Simulation):
         got = type(simulation).__name__
