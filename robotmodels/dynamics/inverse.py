@@ -75,7 +75,7 @@ def idm(
     --------
     >>> from robotmodels.robots import load
     >>> idm(load("puma560"), [0.0] * 6).round(2)
-    array([ 0.  , 37.48,  0.25,  0.  ,  0.  ,  0.  ])
+    array([-1.25, 40.45,  0.97, -0.22, -0.19, -0.25])
     """
     check_model(model)
     check_all_or_none(drive)
