@@ -14,15 +14,27 @@ NOISE = 1e-4
 """Standard deviation of positions, m."""
 
 
-def erroneous(model, rng, length=1e-3, angle=2e-3, keep=()):
+def slope(function, x, k, h=1e-3):
+    """Central difference with two steps of extrapolation: errors of the order of h^6."""
+    d = np.zeros_like(x)
+    d[k] = 1.0
+    table = [(function(x + s * d) - function(x - s * d)) / (2 * s) for s in (h, h / 2, h / 4)]
+    first = [(4 * table[1] - table[0]) / 3, (4 * table[2] - table[1]) / 3]
+    return (16 * first[1] - first[0]) / 15
+
+
+def erroneous(model, rng, length=1e-3, angle=2e-3):
     """A robot with errors everywhere in its table."""
     table, f = model.table, model.f
     parallel = np.abs(np.sin(table.alpha)) < 1e-6
     sizes = {"alpha": angle, "beta": angle * parallel, "d": length, "theta": angle, "r": length}
     columns = {x: getattr(table, x) + size * rng.normal(size=f) for x, size in sizes.items()}
-    for name, row in keep:
-        columns[name][row - 1] = getattr(table, name)[row - 1]
     return model.with_table(dataclasses.replace(table, **columns))
+
+
+def distances(lengths):
+    """Known distances of the two points of each place."""
+    return [KnownDistance(f"point:{k}:0", f"point:{k}:1", x) for k, x in enumerate(lengths)]
 
 
 class Arm:
@@ -66,36 +78,41 @@ class Arm:
             return q + self.scale * self.each * np.sign(np.diff(q, axis=0, prepend=0.0))
         return q
 
-    def positions(self, q):
-        p = rm.dgm(self.real, self.actual(q))[:, :3, 3]
-        return Position(q, p + NOISE * self.rng.normal(size=p.shape))
+    def poses(self, q):
+        return rm.dgm(self.real, self.actual(q))
 
-    def touches(self, places, count, pitch=0.0, name="point"):
+    def positions(self, q, noise=NOISE):
+        p = self.poses(q)[:, :3, 3]
+        return Position(q, p + noise * self.rng.normal(size=p.shape))
+
+    def touching(self, points, count):
+        """Readings at which the real tool is near points, and the number of the point of each."""
+        q, labels = [], []
+        for label, point in enumerate(points):
+            T = np.tile(np.eye(4), (4 * count, 1, 1))
+            T[:, :3, 3] = point + NOISE * self.rng.normal(size=(len(T), 3))
+            start = self.readings(len(T))
+            found = rm.igm_numeric(self.real, T, q0=start, mask="position", rng=self.rng)
+            q.append(found.q[found.valid[:, 0], 0][:count])
+            labels += [label] * len(q[-1])
+        return np.concatenate(q), labels
+
+    def touches(self, places, count, pitch=0.0):
         """Contacts with one or two points (pitch apart) at new places, and the points."""
         contacts, points = [], []
         while len(contacts) < places:
-            k, middle, way = len(contacts), self.readings(1)[0], self.rng.normal(size=3)
-            first = rm.dgm(self.real, middle)[:3, 3]
+            k, way = len(contacts), self.rng.normal(size=3)
+            first = 0.8 * rm.dgm(self.real, self.readings(1))[0, :3, 3]
             here = np.array([first, first + pitch * way / np.linalg.norm(way)])[: 1 + (pitch > 0)]
-            number = np.arange(count) * len(here) // count
-            T = np.tile(np.eye(4), (count, 1, 1))
-            T[:, :3, 3] = here[number]
-            start = middle + 0.4 * self.rng.normal(size=(count, 6))
-            found = rm.igm_numeric(
-                self.real, T, q0=start, mask="position", position_tolerance=1e-12, rng=self.rng
-            )
-            if found.valid[:, 0].all():
-                q = found.q[:, 0]
-                q = q + (q - self.actual(q)) + NOISE * self.rng.normal(size=q.shape)
-                contacts.append(PointContact(q, [f"{k}:{i}" for i in number], name=name))
+            q, labels = self.touching(here, count // len(here))
+            if len(q) == count // len(here) * len(here):
+                contacts.append(PointContact(q, [f"{k}:{label}" for label in labels]))
                 points.append(here)
         return contacts, np.array(points)
 
-    def sockets(self, places):
-        """Places with two sockets each, whose distance of 50 mm is known."""
-        contacts, p = self.touches(places, int(self.rng.integers(16, 40)), 0.05)
-        known = [KnownDistance(f"point:{k}:0", f"point:{k}:1", 0.05, 1e-4) for k in range(len(p))]
-        return [*contacts, *known]
+    def sockets(self, places, count=24):
+        """Places with two sockets each, 50 mm apart, and these distances."""
+        return [*self.touches(places, count, 0.05)[0], *distances([0.05] * places)]
 
     def markers(self):
         """Three positions in each of 20 to 40 postures."""

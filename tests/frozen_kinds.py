@@ -1,4 +1,7 @@
-"""Measurements for `frozen_estimates`: RX-90 with known errors, all kinds; UR10; Panda."""
+"""Simulated measurements of every kind on an RX-90 with known errors; UR10; Panda.
+
+Noisy ones are frozen in `frozen_estimates`, exact ones determine the robot (test_calibration_fit).
+"""
 
 from __future__ import annotations
 
@@ -14,10 +17,14 @@ CONTACT = {"known_lengths": ["r4"]}
 
 
 class Scene:
-    """The nominal robot, its real brother, 60 readings and the noisy poses there."""
+    """The nominal robot, the real one with errors, 60 readings and the poses there with noise.
 
-    def __init__(self):
+    The noise is a factor on 0.1 mm and 0.1 mrad.
+    """
+
+    def __init__(self, noise=1.0):
         self.rng = rng = np.random.default_rng(3)
+        self.noise = 1e-4 * noise
         self.nominal = rm.load("rx90").with_tool(rm.se3.translation(0.05, -0.03, 0.11))
         table = self.nominal.table
         parallel = np.abs(np.sin(table.alpha)) < 1e-6
@@ -30,14 +37,11 @@ class Scene:
         tool = rm.se3.from_rpy([0.2, -0.1, 0.3], [0.05, -0.03, 0.12])
         self.real = self.nominal.with_table(table.replace(**columns)).with_tool(tool)
         self.q = rng.uniform(-2.0, 2.0, (60, 6))
-        noise = [rm.se3.from_rpy(*(1e-4 * rng.normal(size=(2, 3)))) for _ in self.q]
-        T = rm.dgm(self.real, self.q)
-        self.T = T @ noise
-        self.T[:, :3, 3] = T[:, :3, 3] + np.array(noise)[:, :3, 3]
+        self.T = noisy(rm.dgm(self.real, self.q), rng, self.noise)
         self.p = self.T[:, :3, 3]
 
     def met(self, rows, count: int):
-        """Readings at which rows of a pose vanish, found by Newton steps, with 0.1 mrad of noise.
+        """Readings at which rows of a pose vanish, found by Newton steps, with noise.
 
         ``rows(k, T)`` gives residuals (m,) and the matrix (m, 6) that they have of the twist.
         """
@@ -54,7 +58,15 @@ class Scene:
                 if np.abs(e).max() < 1e-10 and np.abs(x).max() < 4.0:
                     break
             q[k] = x
-        return q + 1e-4 * self.rng.normal(size=q.shape)
+        return q + self.noise * self.rng.normal(size=q.shape)
+
+
+def noisy(T, rng, noise=1e-4):
+    """Poses moved (m) and turned (rad) by noise."""
+    moved = np.array([rm.se3.from_rpy(*(noise * rng.normal(size=(2, 3)))) for _ in T])
+    found = T @ moved
+    found[:, :3, 3] = T[:, :3, 3] + moved[:, :3, 3]
+    return found
 
 
 def linear(B, at):
@@ -85,9 +97,9 @@ ALONG = np.array([[0.0, 0.6, 0.8], [0.8, 0.0, 0.6], [0.0, 1.0, 0.0]])
 
 
 @cache
-def measured(kind: str):
+def measured(kind: str, noise: float = 1.0):
     """Nominal robot, measurements of a kind, and options of the fit."""
-    s, c = Scene(), calibration
+    s, c = Scene(noise), calibration
     options: dict = {}
     if kind == "pose":
         found = [c.Pose(s.q, s.T)]
@@ -156,11 +168,7 @@ def simulated_ur10():
     real = real.with_base(rm.se3.from_rpy([0.03, -0.02, 0.05], [0.05, -0.03, 0.02]) @ real.base)
     real = real.with_tool(real.tool @ rm.se3.from_rpy([0.2, -0.1, 0.3], [0.05, -0.03, 0.12]))
     q = rng.uniform(-2.5, 2.5, (200, nominal.n))
-    noise = [rm.se3.from_rpy(*(1e-4 * rng.normal(size=(2, 3)))) for _ in q]
-    T = rm.dgm(real, q)
-    turned = T @ noise
-    turned[:, :3, 3] = T[:, :3, 3] + np.array(noise)[:, :3, 3]
-    return nominal, q, turned
+    return nominal, q, noisy(rm.dgm(real, q), rng)
 
 
 def touched(data, place: str) -> list:

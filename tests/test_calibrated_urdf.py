@@ -8,6 +8,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pinocchio as pin
 import pytest
+from frozen_kinds import touched
 from identities.random_robots import random_pose
 
 import robotmodels as rm
@@ -18,83 +19,60 @@ from robotmodels.errors import UrdfWarning
 
 EXACT = 1e-9
 SEEDS = range(3)
+BODY = """  <!-- the <link> {0} > 0 -->
+  <link name="{0}">
+    <inertial><origin xyz="0.01 0 0.02"/><mass value="1.5"/>
+      <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial>
+    <visual><origin xyz="0 0 0.1" rpy="0 0 1"/><geometry>
+      <mesh filename="package://arm/{0}.dae"/></geometry><material name="grey"/></visual>
+  </link>"""
+JOINT = """  <joint name="{0}_{1}" type="{2}">
+    <!-- <origin xyz="9 9 9"/> -->
+    <parent link="{0}"/>{3}
+    <child link="{1}"/>
+    {4}
+  </joint>"""
 
 
 # --- robots as people write them ------------------------------------------------------------------
 
 
-def words(values):
-    return " ".join(f"{v:.6g}" for v in values)
-
-
-def origin(rng):
-    """A place, sometimes left out, sometimes with one part only, sometimes not closed at once."""
-    xyz, rpy = f'xyz="{words(rng.uniform(-0.4, 0.4, 3))}"', f'rpy="{words(rng.uniform(-3, 3, 3))}"'
-    return rng.choice([
+def joint(rng, parent, child, kind=None):
+    """A joint; its origin is left out, has one part only, or is not closed at once."""
+    words = [" ".join(f"{v:.6g}" for v in rng.uniform(-size, size, 3)) for size in (0.4, 3.0)]
+    xyz, rpy = f'xyz="{words[0]}"', f'rpy="{words[1]}"'
+    origin = rng.choice([
         "", f"<origin {xyz}/>", f"<origin {rpy} {xyz}  />", f"<origin {xyz} {rpy}></origin>",
         f"<origin\n      {rpy}\n      {xyz}/>", f"<origin {xyz.replace(chr(34), chr(39))} {rpy}/>",
     ])  # fmt: skip
-
-
-def link(name, body=True):
-    if not body:
-        return f'  <link name="{name}"/>'
-    return f"""  <!-- the <link> {name} > 0 -->
-  <link name="{name}">
-    <inertial><origin xyz="0.01 0 0.02"/><mass value="1.5"/>
-      <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial>
-    <visual><origin xyz="0 0 0.1" rpy="0 0 1"/><geometry>
-      <mesh filename="package://arm/{name}.dae"/></geometry><material name="grey"/></visual>
-    <collision><geometry><mesh filename="package://arm/{name}.stl"/></geometry></collision>
-  </link>"""
-
-
-def joint(rng, parent, child, kind=None, inside=""):
     kind = kind or rng.choice(["revolute", "continuous", "prismatic"], p=[0.6, 0.2, 0.2])
     axis = rng.choice(["<axis xyz='0 0 1'/>", '<axis xyz="0 -1 0"/>', "", '<axis xyz="1 -2 0.5"/>'])
-    limit = '<limit lower="-2.5" upper="2.25" effort="10" velocity="3"/>'
-    if kind == "fixed":
-        axis = limit = ""
-    return (
-        f'  <joint name="{parent}_{child}" type="{kind}">\n    <!-- <origin xyz="9 9 9"/> -->\n'
-        f'    <parent link="{parent}"/>{origin(rng)}\n    <child link="{child}"/>\n'
-        f"    {axis}{limit}{inside}\n  </joint>"
-    )
+    axis += '<limit lower="-2.5" upper="2.25" effort="10" velocity="3"/>'
+    if child == "finger_2":
+        axis += '<mimic joint="hand_finger_1" multiplier="-1"/>'
+    return JOINT.format(parent, child, kind, origin, "" if kind == "fixed" else axis)
 
 
-def arm_text(rng, mount=False, stand=False, length=4, flange=True):
+def arm_text(rng, mount=False, stand=False, flange=True):
     """An arm with a camera, a hand with two fingers beyond its tip, and a second arm."""
-    body = ["base", *(f"l{k}" for k in range(1, length + 1))]
-    joints = []
-    if stand:
-        joints.append(("stand", "base", "fixed"))
-    if mount:
-        joints += [("base", "mount", "fixed"), ("mount", "l1")]
-        body.insert(1, "mount")
-    else:
-        joints.append(("base", "l1"))
-    joints += [(f"l{k}", f"l{k + 1}") for k in range(1, length)]
-    joints += [("base", "plate", "fixed"), (f"l{length - 1}", "camera", "fixed"),
-               ("camera", "lens", "fixed"), ("base", "lamp"), ("l2", "cover")]  # fmt: skip
-    end = f"l{length}"
-    if flange:
-        joints += [(end, "flange", "fixed"), ("flange", "tip", "fixed")]
-        end = "tip"
-    joints += [(end, "hand", "fixed"), ("hand", "finger_1", "prismatic"),
-               ("hand", "finger_2", "prismatic")]  # fmt: skip
+    first, end = "mount" if mount else "base", "tip" if flange else "l4"
+    joints = [(first, "l1"), ("l1", "l2"), ("l2", "l3"), ("l3", "l4"), ("base", "plate", "fixed"),
+              ("l3", "camera", "fixed"), ("camera", "lens", "fixed"), ("base", "lamp"),
+              ("l2", "cover"), (end, "hand", "fixed"), ("hand", "finger_1", "prismatic"),
+              ("hand", "finger_2", "prismatic")]  # fmt: skip
+    joints += [("l4", "flange", "fixed"), ("flange", "tip", "fixed")] * flange
+    joints += [("base", "mount", "fixed")] * mount + [("stand", "base", "fixed")] * stand
     joints = [joints[k] for k in rng.permutation(len(joints))]
     names = list(dict.fromkeys(name for a, b, *_ in joints for name in (a, b)))
-    mimic = '<mimic joint="hand_finger_1" multiplier="-1"/>'
-    lines = ['<?xml version="1.0"?>', "<!-- by xacro -->", '<robot name="arm">']
-    lines += ['  <material name="grey"><color rgba="0.5 0.5 0.5 1"/></material>']
-    lines += [link(name, name != "tip") for name in names]
-    lines += [
-        joint(rng, a, b, *kind, inside=mimic if b == "finger_2" else "") for a, b, *kind in joints
-    ]
-    lines += ['  <gazebo reference="l1"><selfCollide>true</selfCollide></gazebo>',
-              '  <transmission name="t"><joint name="base_l1"/><origin xyz="1 1"/></transmission>',
-              "</robot>", ""]  # fmt: skip
-    return "\n".join(lines)
+    return "\n".join([
+        '<?xml version="1.0"?>', "<!-- by xacro -->", '<robot name="arm">',
+        '  <material name="grey"><color rgba="0.5 0.5 0.5 1"/></material>',
+        *('  <link name="tip"/>' if name == "tip" else BODY.format(name) for name in names),
+        *(joint(rng, *each) for each in joints),
+        '  <gazebo reference="l1"><selfCollide>true</selfCollide></gazebo>',
+        '  <transmission name="t"><joint name="base_l1"/><origin xyz="1 1"/></transmission>',
+        "</robot>", "",
+    ])  # fmt: skip
 
 
 def calibrated(model, rng, frames=(None,), size=0.02, **options):
@@ -171,15 +149,7 @@ def test_the_named_tip_is_the_calibrated_one_and_only_origins_change(seed):
     own = {f"l{k}_l{k + 1}" for k in range(1, 4)} | {"flange_tip"}
     own |= {"base_mount", "mount_l1"} if seed % 2 == 0 else {"base_l1"}
     assert changed_joints(text, written) == own
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_links_beside_the_chain_keep_their_place_in_their_bodies(seed):
-    rng = np.random.default_rng(seed)
-    text = arm_text(rng)
-    model = rm.RobotModel.from_urdf(text, tip_link="tip")
-    robot = calibrated(model, rng, base=False)
-    written = calibrated_urdf(robot)
+    # links beside the chain keep their place in their bodies
     bodies = {"camera": "l3", "lens": "l3", "flange": "l4", "cover": "l2", "plate": "base",
               "lamp": "base", "hand": "tip", "finger_2": "tip"}  # fmt: skip
     for q in rng.uniform(-2.0, 2.0, (2, model.n)):
@@ -312,19 +282,14 @@ def test_what_the_text_cannot_hold_is_warned_of(rng):
 
 def test_the_panda_that_was_calibrated_by_its_own_ball_is_right_at_the_ball():
     data = panda_double_socket()
-    in_0, in_1 = data.places["front"]
-    touched = calibration.PointContact([*in_0, *in_1], [0] * len(in_0) + [1] * len(in_1))
-    socket = calibration.KnownDistance("point:0", "point:1", data.distance)
-    result = calibration.fit(data.model, [touched, socket], folds=0, held_out=0.0)
+    result = calibration.fit(data.model, touched(data, "front"), folds=0, held_out=0.0)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         written = calibrated_urdf(result.robot)
-    for q in in_0[::6]:
-        there = rm.dgm(result.model, q)
-        np.testing.assert_allclose(pin_pose(written, result.model, q, "ball_link"), there, 0, EXACT)
+    q = data.places["front"][0]
 
     def spread(text):
-        balls = np.array([pin_pose(text, data.model, q, "ball_link")[:3, 3] for q in in_0])
+        balls = np.array([pin_pose(text, data.model, row, "ball_link")[:3, 3] for row in q])
         return np.linalg.norm(balls - balls.mean(axis=0), axis=1).mean()
 
     assert spread(written) < 3e-4 < 3e-3 < spread(data.urdf)

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from calibration_arms import slope
 from identities.random_robots import random_model, random_state
-from test_calibration_measurements import slope
 
 import robotmodels as rm
 from robotmodels.calibration import (
@@ -13,7 +13,6 @@ from robotmodels.calibration import (
 )
 from robotmodels.calibration.extended_table import Element, extend_table
 from robotmodels.calibration.parameters import ErrorLaw, GeometricParameter
-from robotmodels.errors import InvalidValueError, NotARotationError
 from robotmodels.geometry import FIXED, PRISMATIC
 
 STRUCTURES = {
@@ -69,42 +68,31 @@ def test_psi_is_the_derivative_of_the_pose(structure, corrected):
 
 
 @pytest.mark.parametrize("structure", STRUCTURES)
-def test_corrections_of_elements_are_those_of_a_changed_table(structure):
+def test_corrections_are_a_changed_table_and_laws_changes_of_the_joint_variables(structure):
     rng = np.random.default_rng(23)
     model = random_model(rng, **STRUCTURES[structure])
     parameters = every_parameter(model, (None,))
-    xi = np.zeros(len(parameters))
-    columns = {e.word: getattr(model.table, e.word).copy() for e in Element}
-    for k, entry in enumerate(parameters.entries):
-        if entry.law is ErrorLaw.CONSTANT and 1 <= entry.row <= model.f:
-            xi[k] = 0.1 * rng.normal()
-            columns[entry.element.word][entry.row - 1] += xi[k]
-    changed = model.with_table(model.table.replace(**columns))
     q = random_state(model, rng, 4)[0]
-    T = differential_model(parameters, q, xi).T
-    np.testing.assert_allclose(T, rm.dgm(changed, q), atol=1e-12)
-
-
-@pytest.mark.parametrize("structure", STRUCTURES)
-def test_laws_are_changes_of_the_joint_variables(structure):
-    rng = np.random.default_rng(29)
-    model = random_model(rng, **STRUCTURES[structure])
-    parameters = every_parameter(model, (None,))
-    q = random_state(model, rng, 4)[0]
-    tau = rm.gravity_torque(model, q)
     factors = {
-        ErrorLaw.GAIN: q, ErrorLaw.COMPLIANCE: -tau, ErrorLaw.SINE: np.sin(q),
-        ErrorLaw.COSINE: np.cos(q), ErrorLaw.SINE_2: np.sin(2 * q),
-        ErrorLaw.COSINE_2: np.cos(2 * q),
+        ErrorLaw.GAIN: q, ErrorLaw.COMPLIANCE: -rm.gravity_torque(model, q),
+        ErrorLaw.SINE: np.sin(q), ErrorLaw.COSINE: np.cos(q),
+        ErrorLaw.SINE_2: np.sin(2 * q), ErrorLaw.COSINE_2: np.cos(2 * q),
     }  # fmt: skip
     assert set(factors) == set(ErrorLaw) - {ErrorLaw.CONSTANT}
-    xi, moved = np.zeros(len(parameters)), q.copy()
+    (table, laws), moved = np.zeros((2, len(parameters))), q.copy()
+    columns = {e.word: getattr(model.table, e.word).copy() for e in Element}
     joint = parameters.table.joint
     for k, entry in enumerate(parameters.entries):
         if entry.law is not ErrorLaw.CONSTANT:
-            xi[k] = 0.02 * rng.normal()
-            moved[:, joint[entry.row]] += xi[k] * factors[entry.law][:, joint[entry.source]]
-    T = differential_model(parameters, q, xi).T
+            laws[k] = 0.02 * rng.normal()
+            moved[:, joint[entry.row]] += laws[k] * factors[entry.law][:, joint[entry.source]]
+        elif 1 <= entry.row <= model.f:
+            table[k] = 0.1 * rng.normal()
+            columns[entry.element.word][entry.row - 1] += table[k]
+    changed = model.with_table(model.table.replace(**columns))
+    T = differential_model(parameters, q, table).T
+    np.testing.assert_allclose(T, rm.dgm(changed, q), atol=1e-12)
+    T = differential_model(parameters, q, laws).T
     np.testing.assert_allclose(T, rm.dgm(model, moved), atol=1e-11)
 
 
@@ -131,13 +119,3 @@ def test_two_robots_side_by_side_move_as_they_did(seed):
     np.testing.assert_allclose(rm.idm(pair, q, v, acceleration), torque, atol=1e-9)
     np.testing.assert_array_equal(pair.lower, np.r_[a.lower, b.lower])
     np.testing.assert_array_equal(pair.table.effort, np.r_[a.table.effort, b.table.effort])
-
-
-def test_what_cannot_stand_side_by_side_is_named():
-    arm = rm.load("rx90")
-    with pytest.raises(InvalidValueError, match="two different texts"):
-        combine_arms(arm, arm, names=("a", "a"))
-    with pytest.raises(InvalidValueError, match="its gravity"):
-        combine_arms(arm, arm.with_gravity([0, 9.81, 0]))
-    with pytest.raises(NotARotationError):
-        combine_arms(arm, arm, 2 * np.eye(4))

@@ -19,29 +19,7 @@ from robotmodels.calibration import (
 )
 from robotmodels.calibration.identifiable import DEPENDENT, identifiable_on
 from robotmodels.calibration.measurements.kinds import drawn_groups
-from robotmodels.errors import InvalidValueError
 from robotmodels.kinematics.lengths import spread_configurations
-
-ANGLES = [0.0, np.pi / 2, -np.pi / 2, np.pi, 0.4]
-CONTACTS = ["point_contact", "frame_contact", "plane_contact"]
-
-
-def serial(rng, R, P, special):
-    """A serial arm of R revolute and P prismatic joints in any order; special: many right angles,
-    parallel and intersecting axes, lengths of zero, but no axis that coincides with another.
-    """
-    n = R + P
-    sigma = rng.permutation([0] * R + [1] * P)
-    angles, lengths = rng.uniform(-3, 3, (2, n)), rng.uniform(-0.5, 0.5, (2, n))
-    if special:
-        angles, lengths = rng.choice(ANGLES, (2, n)), rng.choice([0.0, 0.3, -0.2], (2, n))
-    (alpha, theta), (d, r) = angles, lengths
-    d[(np.abs(np.sin(alpha)) < 0.01) & (d == 0.0)] = 0.25
-    lower, upper = np.where(sigma == 0, -2.5, -0.4), np.where(sigma == 0, 2.0, 0.5)
-    table = rm.DHTable(
-        np.arange(n), sigma, alpha=alpha, d=d, theta=theta, r=r, lower=lower, upper=upper
-    )
-    return rm.RobotModel.from_table(table, base=random_pose(rng), tool=random_pose(rng, 0.3))
 
 
 def rank_of(W):
@@ -55,27 +33,26 @@ def rank_of(W):
 # --- counts ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("special", [False, True])
-@pytest.mark.parametrize(("R", "P"), [(6, 0), (3, 3), (2, 1), (0, 3), (7, 0), (1, 0)])
-def test_full_poses_identify_four_for_a_revolute_two_for_a_prismatic_joint_and_six(R, P, special):
-    rng = np.random.default_rng(100 * R + P + 7 * special)
-    basis = identifiable_parameters(serial(rng, R, P, special), "pose")
-    assert basis.count == 4 * R + 2 * P + 6
+@pytest.mark.parametrize("name", ["rx90", "ur10e", "panda", "stanford_arm", "lab_rrt", "gantry"])
+def test_full_poses_identify_four_for_a_revolute_two_for_a_prismatic_joint_and_six(name):
+    model = rm.load(name).with_base(random_pose(np.random.default_rng(0)))
+    basis = identifiable_parameters(model, "pose")
+    assert (
+        basis.count == 4 * np.sum(model.table.sigma == 0) + 2 * np.sum(model.table.sigma == 1) + 6
+    )
     assert basis.gap[1] < 1e-9 < 1e-4 < basis.gap[0]
 
 
 @pytest.mark.parametrize(
-    ("name", "kind", "count"),
+    ("kind", "count"),
     [
-        ("erd:ur10", Pose, 30),
-        ("ur10e", "pose", 30),
-        ("rx90", Position, 21),  # the wrist centre: theta4 to theta6 have no effect
-        ("rx90", "orientation", 15),  # directions of six axes, turn of the tool
-        ("rx90", ["point_contact", "position"], 21),  # points give scale and place
+        (Position, 21),  # the wrist centre: theta4 to theta6 have no effect
+        ("orientation", 15),  # directions of six axes, turn of the tool
+        (["point_contact", "position"], 21),  # points give scale and place
     ],
 )
-def test_counts_of_known_robots(name, kind, count):
-    basis = identifiable_parameters(rm.load(name), kind)
+def test_counts_of_a_known_robot(kind, count):
+    basis = identifiable_parameters(rm.load("rx90"), kind)
     assert basis.count == count
     assert not basis.of_reason(Reason.GAUGE) or kind == "orientation"
     if kind is Position:
@@ -103,9 +80,7 @@ def test_counts_equal_the_rank_of_the_singular_values_on_random_robots(chunk):
             assert basis.count == rank_of(psi[:, :rows].reshape(-1, len(candidates))), basis.gap
 
 
-@pytest.mark.parametrize(
-    ("name", "known"), [("rx90", "d3"), ("ur10e", "d3"), ("panda", "r3"), ("stanford_arm", "r2")]
-)
+@pytest.mark.parametrize(("name", "known"), [("rx90", "d3"), ("panda", "r3"), ("cobra_s600", "d2")])
 def test_point_contacts_identify_the_rank_of_differences_within_each_group(name, known):
     model = rm.load(name)
     candidates = candidate_parameters(model)
@@ -146,30 +121,14 @@ def test_every_candidate_is_kept_or_has_a_reason_and_the_text_says_so():
     assert set(basis.of_reason(Reason.GAUGE)) == {"gamma0", "b0", "alpha0", "d0", "theta0", "r0"}
     for name, terms in basis.regrouped_into.items():
         assert all(basis.regrouping[kept][name] == c for kept, c in terms.items())
-    assert len(basis.factor) == basis.count
     again = pickle.loads(pickle.dumps(basis))
     assert again.names == basis.names
     assert not again.factor.flags.writeable
-    for part in (
-        "14 identifiable parameters of 34",
-        "d3: it is known and fixed.",
-        "theta0: the base pose is not measured",
-        "Only in combination",
-        "combination",
-    ):
+    for part in ("14 identifiable parameters of 34", "d3: it is known", "theta0: the base pose"):
         assert part in str(basis)
 
 
 # --- scale and place of evaluation -------------------------------------------------------------
-
-
-@pytest.mark.parametrize("kind", CONTACTS)
-def test_contacts_without_a_known_length_are_refused_with_names(kind):
-    with pytest.raises(InvalidValueError, match=r"contain no length.*known_lengths=\('\w+',\).*d3"):
-        identifiable_parameters(rm.load("kr6_r900"), kind)
-    with pytest.raises(InvalidValueError, match="contain no length"):
-        # an angle is no length, and a length of 0 shrinks to itself
-        identifiable_parameters(rm.load("rx90"), kind, known_lengths=["theta2", "d5"])
 
 
 def test_contacts_are_judged_where_the_corrected_robot_meets_them():
@@ -189,12 +148,12 @@ def test_contacts_are_judged_where_the_corrected_robot_meets_them():
         assert of_data.count == structure.count
 
 
-@pytest.mark.parametrize("unit", [1e-6, 1e6])
-def test_the_unit_of_length_does_not_change_what_is_identifiable(unit):
+def test_the_unit_of_length_does_not_change_anything():
+    """Of robots a million times smaller and larger, and a thousand times with the default prior."""
     rng = np.random.default_rng(3)
     q, noise = rng.uniform(-1.0, 1.0, (30, 4)), rng.normal(size=(30, 3))
 
-    def fitted(size):
+    def fitted(size, prior):
         rows = [
             {"sigma": 0}, {"sigma": 0, "alpha": np.pi / 2, "d": size},
             {"sigma": 0, "d": 4.0 * size}, {"sigma": 0, "d": 3.0 * size, "alpha": 0.5, "r": size},
@@ -202,14 +161,18 @@ def test_the_unit_of_length_does_not_change_what_is_identifiable(unit):
         arm = rm.RobotModel.from_table(rm.DHTable.from_rows(rows))
         T = rm.dgm(arm, q)
         T[:, :3, 3] += 1e-4 * size * noise
-        prior = calibration.ParameterPrior(length=1e-3 * size)
         result = calibration.fit(arm, Pose(q, T), prior=prior, folds=0, held_out=0)
         contact = identifiable_parameters(arm, "point_contact", known_lengths=["d3"])
         left = (rm.dgm(result.model, q) - T)[:, :3, 3] / size
         return result.names, contact.names, result.status, np.linalg.norm(left)
 
-    *one, left = fitted(1.0)
-    *other, other_left = fitted(unit)
-    assert len(one[0]) == 22
-    assert other == one
-    assert other_left == pytest.approx(left, rel=1e-9)
+    for small, large, prior in (
+        *((1.0, unit, calibration.ParameterPrior) for unit in (1e-6, 1e6)), (1e-6, 1e-3, None),
+    ):  # fmt: skip
+        (*one, left), (*other, other_left) = (
+            fitted(size, prior(length=1e-3 * size) if prior else calibration.ParameterPrior())
+            for size in (small, large)
+        )
+        assert len(one[0]) == 22
+        assert other == one
+        assert other_left == pytest.approx(left, rel=1e-9)

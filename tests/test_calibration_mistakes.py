@@ -5,22 +5,120 @@ import re
 
 import numpy as np
 import pytest
-from calibration_arms import ALONE, NOISE, Arm
+from calibration_arms import ALONE, Arm, distances
 
 import robotmodels as rm
 from robotmodels.calibration import (
     KnownDistance,
     ParameterPrior,
+    PlaneContact,
     PointContact,
     Pose,
     Position,
+    combine_arms,
     fit,
+    identifiable_parameters,
     read_measurements,
     report,
+    select_configurations,
 )
-from robotmodels.calibration.measurements import CameraPose, Distance, RelativePose
+from robotmodels.calibration.measurements import (
+    AxisPosition,
+    CameraPose,
+    Distance,
+    FrameContact,
+    LaserLine,
+    LinkedFrames,
+    RelativePose,
+)
 from robotmodels.datasets import panda_double_socket
-from robotmodels.errors import InvalidValueError
+from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
+from robotmodels.obstacles import Sphere
+
+# --- bad input ------------------------------------------------------------------------------------
+
+RX90 = rm.load("rx90")
+Q4, Z, TWO = np.zeros((4, 6)), np.eye(4), [0, 0, 1, 1]
+Q = np.random.default_rng(2).uniform(-1.5, 1.5, (30, 6))
+STILL, T = np.tile(Z, (4, 1, 1)), rm.dgm(RX90, Q)
+SEEN = Pose(Q, T)
+
+
+def fitted(measurements=SEEN, model=RX90, **options):
+    return fit(model, measurements, **{**ALONE, **options})
+
+
+def selected(kind, count, **options):
+    return select_configurations(RX90, kind, count, **options)
+
+
+@pytest.mark.parametrize(
+    ("error", "match", "call"),
+    [
+        # measurements
+        (InvalidValueError, "q: expected finite", lambda: FrameContact(Q4 * np.nan)),
+        (ShapeError, "pose: expected a label for each of the 4", lambda: FrameContact(Q4, [0, 1])),
+        (ValueError, "has the point '2'; exp", lambda: PointContact(Q4, TWO, {2: Z[0, :3]})),
+        (InvalidValueError, "expected a mapping", lambda: PointContact(Q4, known=[0.1, 0.2, 0.3])),
+        (ValueError, r"of length 2\. Divide", lambda: PlaneContact(Q4, known={0: [0, 0, 2, 0.4]})),
+        (InvalidValueError, "axis: expected a direc", lambda: AxisPosition(Q4, 0.0, [0, 0, 0])),
+        (InvalidValueError, r"positive lengths .* offset=True", lambda: Distance(Q4, -0.1)),
+        (InvalidValueError, "not both", lambda: Distance(Q4, 0.1, Q4 + 1, pivot=[0] * 4)),
+        (ShapeError, r"T: expected shape \(4, 4, 4\)", lambda: CameraPose(Q4, STILL[:2])),
+        (NotARotationError, "T", lambda: RelativePose(Q4, Q4, 2 * STILL)),
+        (InvalidValueError, "rows: expected 6 numbers", lambda: Pose(Q4, STILL, rows=[0] * 6)),
+        (InvalidValueError, "another end than 'a'", lambda: LinkedFrames(Q4, "a", "a")),
+        (InvalidValueError, "a positive length", lambda: KnownDistance("a", "b", -1.0)),
+        (InvalidValueError, "positive definite", lambda: LaserLine(Q4, covariance=np.diag([1, 0]))),
+        # fits
+        (InvalidValueError, "masses", lambda: fitted(
+            model=rm.load("stanford_arm"), compliance="joints")),
+        (InvalidValueError, "degrees", lambda: fitted(Position(np.rad2deg(Q), T[:, :3, 3]))),
+        (ShapeError, "6 joints", lambda: fitted(Position(np.zeros((4, 7)), np.zeros((4, 3))))),
+        (InvalidValueError, "expected one or more", lambda: fitted([])),
+        (InvalidValueError, "Pose, Position", lambda: fitted([T])),
+        (InvalidValueError, "held_out", lambda: fitted(held_out=1.5)),
+        (InvalidValueError, "folds", lambda: fitted(folds=1)),
+        (InvalidValueError, "ParameterPrior or None", lambda: fitted(prior="none")),
+        (InvalidValueError, "strength", lambda: fitted(
+            Pose(Q4, T[:4]), parameters=["theta2"], prior=ParameterPrior(strength=None))),
+        (InvalidValueError, "theta9.*near it: theta", lambda: fitted(parameters=["theta9"])),
+        (InvalidValueError, "theta9.*near it: theta", lambda: fitted(
+            prior=ParameterPrior(named={"theta9": 1.0}))),
+        (InvalidValueError, r"contain no length.*known_lengths", lambda: fitted(PointContact(Q))),
+        # identifiable and chosen ones
+        (InvalidValueError, r"contain no length.*known_lengths=\('\w+',\).*d3",
+         lambda: identifiable_parameters(rm.load("kr6_r900"), "plane_contact")),
+        # an angle is no length, and a length of 0 shrinks to itself
+        (InvalidValueError, "contain no length",
+         lambda: identifiable_parameters(RX90, FrameContact, known_lengths=["theta2", "d5"])),
+        (InvalidValueError, "at least 5", lambda: selected("pose", 4, candidates=Q)),
+        (InvalidValueError, "expected at most 30.*got 40", lambda: selected(
+            "pose", 40, candidates=Q)),
+        (ShapeError, "candidates", lambda: selected("pose", 10, candidates=Q[:, :5])),
+        (InvalidValueError, "contain no length", lambda: selected(
+            "point_contact", 6, drawn=20, postures=2)),
+        (InvalidValueError, "do not meet", lambda: selected(
+            "point_contact", 6, candidates=Q.reshape(10, 3, 6))),
+        (InvalidValueError, "optimise", lambda: selected("point_contact", 6, optimise=True)),
+        (InvalidValueError, "at most 0", lambda: selected(
+            "pose", 6, drawn=20, obstacles=[Sphere([0, 0, 0], 5.0)])),
+        (InvalidValueError, "criterion", lambda: selected("pose", 6, criterion="O6")),
+        (InvalidValueError, "count", lambda: selected("pose", 0)),
+        (InvalidValueError, "progress", lambda: selected("pose", 6, progress="bar")),
+        (InvalidValueError, "kind: expected one of", lambda: selected(Q, 5)),
+        # two robots
+        (InvalidValueError, "two different texts",
+         lambda: combine_arms(RX90, RX90, names=("a", "a"))),
+        (InvalidValueError, "its gravity",
+         lambda: combine_arms(RX90, RX90.with_gravity([0, 9.81, 0]))),
+        (NotARotationError, "base_b", lambda: combine_arms(RX90, RX90, 2 * Z)),
+    ],
+)  # fmt: skip
+def test_mistakes_are_named(error, match, call):
+    with pytest.raises(error, match=match):
+        call()
+
 
 # --- outliers under squares -----------------------------------------------------------------------
 
@@ -46,61 +144,29 @@ def test_the_bad_rows_alone_are_outliers_under_squares(bad, prior):
 # --- known distances ------------------------------------------------------------------------------
 
 
-def touching(arm, places, count=20):
-    """Readings at which the real tool is at each of some places, and their labels."""
-    q, labels = [], []
-    for label, place in enumerate(places):
-        T = np.tile(np.eye(4), (4 * count, 1, 1))
-        T[:, :3, 3] = place + NOISE * arm.rng.normal(size=(len(T), 3))
-        start = arm.readings(len(T))
-        found = rm.igm_numeric(arm.real, T, q0=start, mask="position", rng=arm.rng)
-        q.append(found.q[found.valid[:, 0], 0][:count])
-        labels += [label] * len(q[-1])
-    return np.concatenate(q), labels
-
-
-def contacts(seed, apart=((0.0, 0.03, 0.04),), count=20):
-    """Contacts of a random arm with a place and others beside it."""
-    arm = Arm(seed)
-    place = 0.8 * rm.dgm(arm.real, arm.readings(1))[0, :3, 3]
-    q, labels = touching(arm, [place, *(place + np.array(d) for d in apart)], count)
-    return arm, PointContact(q, labels)
-
-
-def between(length, other=1, **more):
-    return KnownDistance("point:0", f"point:{other}", length, **more)
-
-
 def notes_of_distances(result):
     return [n for n in result.notes if "known distance" in n and "prior allows" not in n]
 
 
-def prediction(note):
-    """Predicted length and its standard error in a note, mm."""
-    return (float(x) for x in note.split(" predict ")[1].split(" mm")[0].split(" +- "))
-
-
-REACHED = [0, 2, 3, 4, 5, 7, 8, 9]
-"""Seeds of arms that reach their points."""
+def assert_predicts_50(note, most):
+    mean, error = (float(x) for x in note.split(" predict ")[1].split(" mm")[0].split(" +- "))
+    assert abs(mean - 50.0) < 4.0 * error < most
 
 
 @pytest.mark.sampled(3)
-@pytest.mark.parametrize("seed", REACHED)
+@pytest.mark.parametrize("seed", range(8))
 def test_a_wrong_distance_is_contradicted_by_the_lengths_of_the_table(seed):
-    arm, touched = contacts(seed)
-    assert between(0.05).sigma == pytest.approx(1e-4)
-    right, wrong = (fit(arm.nominal, [touched, between(x)], **ALONE) for x in (0.05, 0.051))
+    arm = Arm(seed)
+    (touched,), _ = arm.touches(1, 40, 0.05)
+    right, wrong = (fit(arm.nominal, [touched, *distances([x])], **ALONE) for x in (0.05, 0.051))
     assert not notes_of_distances(right)
     assert touched.blocks not in right.solution.fit.outliers
     (note,) = notes_of_distances(wrong)
-    assert (
-        "point:0 to point:1: stated 51 mm, but the other measurements and the prior predict" in note
-    )
-    mean, error = prediction(note)
-    assert abs(mean - 50.0) < 4.0 * error < 2.0
+    assert "0:0 to point:0:1: stated 51 mm, but the other measurements and the prior pred" in note
+    assert_predicts_50(note, 2.0)
     assert wrong.solution.fit.outliers.tolist()[0] == touched.blocks
     # without a prior it alone gives the scale, and nothing contradicts it
-    alone = fit(arm.nominal, [touched, between(0.051)], **ALONE, prior=None)
+    alone = fit(arm.nominal, [touched, *distances([0.051])], **ALONE, prior=None)
     assert not notes_of_distances(alone)
     assert touched.blocks not in alone.solution.fit.outliers
 
@@ -109,34 +175,27 @@ def test_a_wrong_distance_is_contradicted_by_the_lengths_of_the_table(seed):
 @pytest.mark.parametrize("seed", [0, 3, 7])
 def test_a_wrong_length_at_every_place_and_at_one_place_are_distinguished(seed):
     arm = Arm(seed)
-    q, labels = [], []
-    while len(q) < 3:
-        place = 0.8 * rm.dgm(arm.real, arm.readings(1))[0, :3, 3]
-        there, at = touching(arm, [place, place + np.array([0.0, 0.03, 0.04])], 12)
-        if len(there) == 24:
-            labels += [2 * len(q) + k for k in at]
-            q.append(there)
-    touched = PointContact(np.concatenate(q), labels)
+    touched, _ = arm.touches(3, 24, 0.05)
+    first = sum(m.blocks for m in touched)
 
-    def fitted(lengths):
-        ends = ((f"point:{2 * k}", f"point:{2 * k + 1}") for k in range(3))
-        known = [KnownDistance(*pair, x) for pair, x in zip(ends, lengths, strict=True)]
-        return fit(arm.nominal, [touched, *known], **ALONE)
+    def result(lengths):
+        return fit(arm.nominal, [*touched, *distances(lengths)], **ALONE)
 
-    assert not notes_of_distances(fitted([0.05] * 3))
+    assert not notes_of_distances(result([0.05] * 3))
     for length in (0.049, 0.055):
-        (note,) = notes_of_distances(fitted([length, length + 1e-15, length]))
-        assert note.startswith(f"3 known distances of {1e3 * length:g} mm: the other measurements")
-        mean, error = prediction(note)
-        assert abs(mean - 50.0) < 4.0 * error < 1.5
-        one = fitted([0.05, length, 0.05])
+        (note,) = notes_of_distances(result([length, length + 1e-15, length]))
+        assert note.startswith(
+            f"3 known distances: stated {1e3 * length:g} mm, but the other measurem"
+        )
+        assert_predicts_50(note, 1.5)
+        one = result([0.05, length, 0.05])
         (note,) = notes_of_distances(one)
-        assert f"point:2 to point:3: stated {1e3 * length:g} mm" in note
-        assert touched.blocks + 1 in one.solution.fit.outliers
-        assert touched.blocks not in one.solution.fit.outliers
+        assert f"point:1:0 to point:1:1: stated {1e3 * length:g} mm" in note
+        assert first + 1 in one.solution.fit.outliers
+        assert first not in one.solution.fit.outliers
 
 
-# --- too few measurements -------------------------------------------------------------------------
+# --- too few measurements, and units --------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", [Pose, Position])
@@ -154,8 +213,6 @@ def test_the_number_of_missing_measurements_counts_down_to_one(kind):
     assert "at least 1 more" in messages[-1]
 
 
-# --- units ----------------------------------------------------------------------------------------
-
 FACTORS = [
     (1000.0, "these look like millimetres"),
     (1 / 0.0254, "these look like inches"),
@@ -167,22 +224,21 @@ FACTORS = [
 def seen_by(kind, arm, q, factor):
     """Measurements of a kind with their lengths in another unit."""
     T = rm.dgm(arm.real, q)
-    scaled = T.copy()
-    scaled[:, :3, 3] *= factor
-    if kind == "position":
-        return Position(q, scaled[:, :3, 3])
-    if kind == "pose":
-        return Pose(q, scaled)
-    if kind == "pivot":
-        return Distance(q, factor * np.linalg.norm(T[:, :3, 3] - [0.5, 0.2, 1.0], axis=1))
-    if kind == "pair":
-        apart = T[:, :3, 3] - np.roll(T[:, :3, 3], 1, axis=0)
-        return Distance(q, factor * np.linalg.norm(apart, axis=1), np.roll(q, 1, axis=0))
-    seen = rm.se3.inverse(T) @ rm.se3.translation(1.0, 0.5, 0.2)
-    if kind == "relative":
-        seen = rm.se3.inverse(T) @ np.roll(T, 1, axis=0)
-    seen[:, :3, 3] *= factor
-    return CameraPose(q, seen) if kind == "camera" else RelativePose(q, np.roll(q, 1, 0), seen)
+    other, p = np.roll(T, 1, axis=0), T[:, :3, 3]
+    board = rm.se3.translation(1.0, 0.5, 0.2)
+    poses = {"position": T, "pose": T, "camera": rm.se3.inverse(T) @ board,
+             "relative": rm.se3.inverse(T) @ other}.get(kind, T).copy()  # fmt: skip
+    poses[:, :3, 3] *= factor
+    return {
+        "position": lambda: Position(q, poses[:, :3, 3]),
+        "pose": lambda: Pose(q, poses),
+        "pivot": lambda: Distance(q, factor * np.linalg.norm(p - [0.5, 0.2, 1.0], axis=1)),
+        "pair": lambda: Distance(
+            q, factor * np.linalg.norm(p - other[:, :3, 3], axis=1), np.roll(q, 1, axis=0)
+        ),
+        "camera": lambda: CameraPose(q, poses),
+        "relative": lambda: RelativePose(q, np.roll(q, 1, axis=0), poses),
+    }[kind]()
 
 
 @pytest.mark.sampled(4)
@@ -200,15 +256,16 @@ def test_the_unit_of_lengths_is_named(kind, factor, sentence):
 
 
 def test_the_unit_of_a_known_distance_is_named():
-    arm, touched = contacts(0)
+    arm = Arm(0)
+    touched, _ = arm.touches(1, 40, 0.05)
     for factor, sentence in FACTORS[:3]:
-        with pytest.raises(InvalidValueError, match=r"point:0 to point:1") as caught:
-            fit(arm.nominal, [touched, between(0.05 * factor)], **ALONE)
+        with pytest.raises(InvalidValueError, match=r"point:0:0 to point:0:1") as caught:
+            fit(arm.nominal, [*touched, *distances([0.05 * factor])], **ALONE)
         assert sentence in str(caught.value)
         assert "Pass metres: 0.05" in str(caught.value)
 
 
-# --- limits of joints -----------------------------------------------------------------------------
+# --- limits of joints, and notes ------------------------------------------------------------------
 
 
 LOWER, UPPER = np.array([-2, -2, -3, -3, -2, -0.1]), np.array([2, 2, 3, -0.1, 2, 3])
@@ -231,9 +288,6 @@ def test_columns_beyond_the_limits_are_refused_before_any_fit(mistake):
     assert "1 of 40 readings, by up to 0.3 rad" in note
 
 
-# --- notes ----------------------------------------------------------------------------------------
-
-
 def test_implausible_residuals_are_the_first_note_and_end_the_search_for_their_cause():
     arm = Arm(0)
     q = arm.readings(40)
@@ -245,44 +299,26 @@ def test_implausible_residuals_are_the_first_note_and_end_the_search_for_their_c
     assert not any("the residuals are" in note for note in right.notes)
 
 
-# --- files and the command line -------------------------------------------------------------------
+# --- files ----------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def places(tmp_path_factory):
-    """Two sockets at two places of a real arm: its URDF, files with a bad row, and poses."""
+def test_outliers_name_their_files_and_folders_with_poses_are_refused(tmp_path):
     data = panda_double_socket()
-    folder = tmp_path_factory.mktemp("places")
-    urdf = folder / "panda.urdf"
-    urdf.write_text(rm.model.to_urdf(data.model))
-    files, header = [], ",".join(f"q{j}" for j in range(1, 8))
-    for place in ("front", "right"):
-        (folder / place).mkdir()
-        for hole, q in enumerate(data.places[place]):
-            bad = q.copy()
-            bad[7, 3] += 0.04 * (place == "front" and hole == 1)
-            files.append(folder / place / f"hole_{hole}.csv")
-            np.savetxt(files[-1], bad, delimiter=",", header=header, comments="")
-            poses = rm.operational_coordinates(rm.dgm(data.model, q), "quaternion")
-            named = folder / place / f"hole_{hole}_pose.csv"
-            np.savetxt(named, poses, delimiter=",", header=header, comments="")
-    return data, urdf, files
-
-
-def test_a_folder_that_also_holds_poses_is_not_read_as_readings(places):
-    data, _, files = places
-    folder = files[0].parent
+    header, files = ",".join(f"q{j}" for j in range(1, 8)), []
+    (tmp_path / "front").mkdir()
+    for hole, q in enumerate(data.places["front"]):
+        bad = q.copy()
+        bad[7, 3] += 0.04 * hole
+        poses = rm.operational_coordinates(rm.dgm(data.model, q), "quaternion")
+        for rows, name in ((bad, f"hole_{hole}"), (poses, f"hole_{hole}_pose")):
+            files.append(tmp_path / "front" / f"{name}.csv")
+            np.savetxt(files[-1], rows, delimiter=",", header=header, comments="")
     with pytest.raises(InvalidValueError, match="these are not readings of the joints") as caught:
-        read_measurements(folder, "point_contact", data.model)
+        read_measurements(tmp_path / "front", "point_contact", data.model)
     assert "hole_1_pose.csv (" in str(caught.value)
     assert "hole_1.csv (" not in str(caught.value)
-    found = read_measurements(folder, "point_contact", data.model, pattern="hole_?.csv")
-    assert found.labels == ("hole_0", "hole_1")
-
-
-def test_outliers_name_their_files_and_rows(places):
-    data, _, files = places
-    measured = read_measurements(files[:2], "point_contact", data.model)
+    measured = read_measurements(files[::2], "point_contact", data.model)
+    assert measured.labels == ("hole_0", "hole_1")
     k = len(data.places["front"][0]) + 7
     for found, block in ((measured, k), (measured.subset(np.r_[k, :30, 40:60]), 0)):
         known = KnownDistance("point:hole_0", "point:hole_1", data.distance)
@@ -293,6 +329,3 @@ def test_outliers_name_their_files_and_rows(places):
         text = report(result)
         assert "Read for point: front/hole_" in text
         assert re.search(rf"│ +{block + 1} │ +front/hole_1\.csv │ +8 │", text)
-
-
-# --- markers --------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from ..model import RobotModel, check_model
 from .alignment import align_base_and_tool
 from .candidates import chosen_candidates
 from .checks import notes_before
-from .contradiction import contradictions, with_outliers
+from .contradiction import with_contradictions
 from .identifiable import IdentifiableParameters, Reason, identifiable_on
 from .measurements import KnownDistance, Measurement
 from .notes import implausible, notes_after, notes_of_errors
@@ -36,7 +36,7 @@ from .prior import (
 from .problem import as_measurements, guessed_fixtures, measured_frames, problem_of, stacked
 from .result import CalibrationResult
 from .solve import Solution, solve
-from .structure import note_of_structure, structure_of, trials_of
+from .structure import helpful_terms, note_of_structure, structure_of
 from .validation import (
     Validation,
     cross_validated,
@@ -168,8 +168,8 @@ def fit(
         candidates, measured, known, known_lengths, prior, loss, truncation, rng
     )
     expected = given_prior and replace(given_prior, strength=solution.fit.prior.strength)
-    contradicted = contradictions(solution, expected, bool(known_lengths) or prior is not None)
-    solution = with_outliers(solution, contradicted)
+    size_is_known = bool(known_lengths) or prior is not None
+    solution, contradicted = with_contradictions(solution, expected, size_is_known)
     structure = None if implausible(solution) else structure_of(solution, identifiable)
     blocks = sum(m.blocks for m in measured if m.views)
     parts = partition(model, measured, folds if blocks >= 2 * folds else 0, rng)
@@ -192,20 +192,19 @@ def fit(
         work.done(next(done) / total)
 
     step()
-    in_folds = in_test = None
-    if fits:
-        in_folds = cross_validated(solution, parts, nominal, step)
+    in_folds = cross_validated(solution, parts, nominal, step) if fits else None
+    in_test = None
     if test:
         in_test = errors_on(solution, test)
     elif last.splits:
         in_test = cross_validated(solution, last, nominal, step)
     if structure is not None:
-        trials = []
+        helpful = []
         if in_folds is not None:
-            trials = trials_of(
+            helpful = helpful_terms(
                 structure, solution, after.candidates, identify, parts, in_folds, nominal, step
             )
-        notes.append(note_of_structure(structure, trials, in_folds))
+        notes.append(note_of_structure(structure, helpful, in_folds))
     in_sample = errors_of(solution.problem, solution.corrections, solution.fixture_values)
     validation = Validation(given, nominal, in_sample, in_folds, in_test)
     distances = any(isinstance(m, KnownDistance) for m in measured)
@@ -221,7 +220,7 @@ def fit(
             *notes,
             *dict.fromkeys(part.note for part in (parts, last) if part.note),
             *note_of_prior(given_prior, prior, distances),
-            *(c.note for c in contradicted),
+            *contradicted,
             *notes_after(solution, identifiable, after),
         ),
     )

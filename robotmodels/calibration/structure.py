@@ -209,16 +209,7 @@ def _harmonics(q: Array) -> Array:
 # --- terms to try next ----------------------------------------------------------------------------
 
 
-class Trial(NamedTuple):
-    """A fit with one more family: what it gains on held-out data, and whether surely."""
-
-    family: TermFamily
-    errors: Errors
-    gain: float
-    helps: bool
-
-
-def trials_of(
+def helpful_terms(
     structure: Structure,
     solution: Solution,
     candidates: GeometricParameters,
@@ -227,13 +218,18 @@ def trials_of(
     validation: HeldOutErrors,
     nominal: Errors,
     done: Callable[[], None],
-) -> list[Trial]:
-    """Fits with each indicated family, validated on the same parts; largest gain first.
+) -> list[tuple[TermFamily, Errors]]:
+    """Indicated families that surely lower the errors on held-out data; largest gain first.
 
     ``identify`` gives the identifiable ones of some candidates; ``validation`` are the errors of
     the parts without the family.
     """
-    old, trials = solution.problem.parameters, []
+
+    def squares(errors: Errors) -> Array:
+        m, rad = (validation.rms.get(unit, np.inf) for unit in ("m", "rad"))
+        return np.nansum([(errors.position / m) ** 2, (errors.angle / rad) ** 2], axis=0)
+
+    old, before, found = solution.problem.parameters, squares(validation), []
     for family in structure.indicated:
         new = [e for e in structure.parameters.entries if e.law in family.laws]
         identifiable = identify(replace(candidates, entries=(*candidates.entries, *new)))
@@ -244,56 +240,41 @@ def trials_of(
         parameters = replace(old, entries=(*old.entries, *added))
         wider = problem_of(parameters, solution.problem.measurements)
         start = np.concatenate([solution.corrections, np.zeros(len(added)), solution.fixtures])
-        found = refitted(solution, wider, start, solution.scales, tolerance=ROUGH)
+        fitted = refitted(solution, wider, start, solution.scales, tolerance=ROUGH)
         done()
-        errors = cross_validated(found, parts, nominal, done)
-        trials.append(Trial(family, errors, *_gain(validation, errors)))
-    return sorted(trials, key=lambda trial: -trial.gain)
+        errors = cross_validated(fitted, parts, nominal, done)
+        fall = before - squares(errors)
+        gain, sure = float(fall.mean()), _SURE * float(fall.std()) / np.sqrt(len(fall))
+        if gain > max(sure, _GAIN * float(before.mean())):
+            found.append((gain, family, errors))
+    return [(family, errors) for _, family, errors in sorted(found, key=lambda trial: -trial[0])]
 
 
-def _gain(before: Errors, after: Errors) -> tuple[float, bool]:
-    """Relative decrease of the mean square, units by their rms; whether it is significant."""
-    scale = before.rms.get("m", np.inf), before.rms.get("rad", np.inf)
-    was, now = (
-        np.nansum([(errors.position / scale[0]) ** 2, (errors.angle / scale[1]) ** 2], axis=0)
-        for errors in (before, after)
-    )
-    mean = float((was - now).mean())
-    gain = mean / float(was.mean())
-    is_sure = mean > _SURE * float((was - now).std()) / np.sqrt(len(was))
-    return gain, bool(is_sure and gain > _GAIN)
-
-
-def note_of_structure(structure: Structure, trials: Sequence[Trial], without: Errors | None) -> str:
+def note_of_structure(
+    structure: Structure, helpful: Sequence[tuple[TermFamily, Errors]], without: Errors | None
+) -> str:
     """Note on residual structure and the recommended term."""
-    p = f"p {'<=' if structure.p <= _LEAST_P else '='} {structure.p:.2g}"
     text = (
-        f"The residuals depend on the posture ({p}), and no geometric parameter of the fit explains"
-        " it. Standard errors assume independent residuals and are too small."
+        f"The residuals depend on the posture (p {'<=' if structure.p <= _LEAST_P else '='} "
+        f"{structure.p:.2g}), and no geometric parameter of the fit explains it. Standard errors "
+        "assume independent residuals and are too small."
     )
-    helpful = [trial for trial in trials if trial.helps]
     if without is None and structure.indicated:
         terms = " or ".join(f"{family.word} ({family.option})" for family in structure.indicated)
         text += f" A fit with folds shows whether {terms} explains it."
     if without is not None and helpful:
-        found = "; ".join(
-            f"{t.family.word} ({t.family.option}) from {_change(without, t.errors)}"
-            for t in helpful
-        )
-        text += f" Try {helpful[0].family.word} next. Rms error on held-out data: {found}."
+        changes = [
+            f"{family.word} ({family.option}) from {in_unit(without.rms[unit], unit)} to "
+            f"{in_unit(rms, unit)} {printed_unit(unit)}"
+            for family, errors in helpful
+            for unit, rms in errors.rms.items()
+        ]
+        text += f" Try {helpful[0][0].word} next. Rms error on held-out data: {'; '.join(changes)}."
     if not structure.parameters.model.inertia.values.any():
         text += " Give the model masses (with_inertia) to try joint compliance."
-    if not helpful and (trials or not structure.indicated):
+    if not helpful and (without is not None or not structure.indicated):
         text += (
             " Backlash, friction, drift or bending links may be the cause: approach every posture "
             "from the same side, and repeat some measurements at the end."
         )
     return text
-
-
-def _change(before: Errors, after: Errors) -> str:
-    """Rms errors before and after, of each unit that was measured."""
-    return " and ".join(
-        f"{in_unit(before.rms[unit], unit)} to {in_unit(rms, unit)} {printed_unit(unit)}"
-        for unit, rms in after.rms.items()
-    )
