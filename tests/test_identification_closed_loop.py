@@ -5,11 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from identification_fleet import raw, swinging, two_links
-from identities.random_robots import random_bodies, random_model
+from identification_fleet import odd_robots, raw, swinging, two_links
 
 import robotmodels as rm
-from robotmodels.drive import DriveParameters, Transmission
+from robotmodels.drive import DriveParameters
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.estimation.estimate import EstimateStatus
 from robotmodels.identification import (
@@ -33,49 +32,15 @@ from robotmodels.identification.forms import Block
 from robotmodels.identification.signals import central_differences
 from robotmodels.inertia import InertialParameters
 
-KINDS = ("rx90", "gantry", "prismatic", "tree", "tx40")
+ROBOTS = odd_robots()
+KINDS = ("rx90", "prismatic", "tree", "coupled wrist", "fixed frame")
 
 
-def robot(kind):
-    """A robot with drives whose bodies are physical."""
-    rng = np.random.default_rng(7)
-    if kind == "tx40":
-        arm = rm.load("tx40")
-        K = arm.transmission
-        last = [0.0, 0.0, 0.0, 0.0, 0.0]  # friction of the coupled motor so that joints move
-        terms = {"Iam": [*last, 0.01], "Fvm": [*last, 0.7], "Fcm": [*last, 1.1]}
-        return arm.with_transmission(Transmission(K.matrix, K.offset, **terms))
-    if kind == "rx90":
-        arm = rm.load("rx90")
-    elif kind == "gantry":
-        arm = rm.load("gantry")
-        arm = arm.with_inertia(random_bodies(rng, arm.f))
-    elif kind == "prismatic":
-        arm = random_model(np.random.default_rng(3), f=4, name="prismatic")
-        assert 1 in arm.table.sigma
-    else:
-        arm = random_model(np.random.default_rng(5), f=6, tree=True, fixed=True, name="tree")
-        assert 2 in arm.table.sigma
-        assert len(set(arm.table.antecedent)) < arm.f
-    n = arm.n
-    sizes = {"Ia": (0.1, 0.3), "Fv": (0.5, 2.0), "Fc": (0.5, 2.0), "offset": (-0.5, 0.5)}
-    return arm.with_drive(DriveParameters(**{k: rng.uniform(*x, n) for k, x in sizes.items()}))
-
-
-def other(arm, seed=1, spread=0.2):
-    """A robot of the same kind whose bodies and drives differ, physical as well."""
-    rng = np.random.default_rng(seed)
-
-    def scaled(x):
-        return x * rng.uniform(1.0 - spread, 1.0 + spread, (len(x),) + (1,) * (x.ndim - 1))
-
-    terms = {k: scaled(getattr(arm.drive, k)) for k in ("Ia", "Fv", "Fc", "offset")}
-    out = arm.with_inertia(InertialParameters(scaled(arm.inertia.values)))
-    out = out.with_drive(DriveParameters(**terms))
-    if (K := arm.transmission) is not None:
-        terms = {k: scaled(getattr(K, k)) for k in ("Iam", "Fvm", "Fcm")}
-        out = out.with_transmission(Transmission(K.matrix, K.offset, **terms))
-    return out
+def other(arm, factor=1.2):
+    """A robot of the same kind whose bodies are heavier, with less friction."""
+    drive = {k: getattr(arm.drive, k) / factor for k in ("Ia", "Fv", "Fc", "offset")}
+    out = arm.with_inertia(InertialParameters(factor * arm.inertia.values))
+    return out.with_drive(DriveParameters(**drive))
 
 
 def motion(arm, seconds, dt, seed=4):
@@ -85,10 +50,10 @@ def motion(arm, seconds, dt, seed=4):
 
 def recorded(kind, seconds=3.0, dt=2e-3, substeps=1):
     """A robot, its controller, its log without noise, and the width of its dry friction."""
-    arm = robot(kind)
+    arm = ROBOTS[kind]
     q_ref, v_ref = motion(arm, seconds, dt)
     # tuned for another robot, so that the tracking errors are not small
-    control = tuned_controller(other(arm, 11), q_ref, 4.0, period=dt, feed_forward=False)
+    control = tuned_controller(other(arm), q_ref, 4.0, period=dt, feed_forward=False)
     width = dt / substeps * friction_rates(arm, q_ref).dry
     log = simulated_log(arm, control, q_ref, v_ref, dt, width=width, substeps=substeps)
     return arm, control, log, width
@@ -131,7 +96,7 @@ def test_simulated_accelerations_are_those_of_the_direct_model(kind):
 
 
 def test_the_motion_is_that_of_simulate_and_steps_converge_with_order_four():
-    arm = robot("rx90")
+    arm = ROBOTS["rx90"]
     arm = arm.with_drive(replace(arm.drive, Fc=np.zeros(6)))
     q_ref, v_ref = motion(arm, 0.2, 1e-2)
     control = tuned_controller(arm, q_ref, 4.0, period=1e-2, feed_forward=False)
@@ -148,7 +113,7 @@ def test_the_motion_is_that_of_simulate_and_steps_converge_with_order_four():
 
 
 def test_controllers_hold_limit_and_integrate():
-    arm = robot("gantry")
+    arm = ROBOTS["rx90"]
     rest = np.zeros((400, 6))
     control = tuned_controller(arm, rest, 2.0, period=2e-3, feed_forward=False)
     start = np.vstack((rest[:1], rest[1:] + 0.2))
@@ -216,7 +181,7 @@ def test_instruments_and_didim_recover_exact_parameters(kind):
 def test_output_error_recovers_exact_parameters(kind, output):
     arm, control, log, width = recorded(kind, 1.2, 4e-3, substeps=2)
     system, factors, truth = problem(arm, log, width)
-    start = values_of(system, other(arm, spread=0.1))
+    start = values_of(system, other(arm, 1.1))
     method = OutputError(control, start, width=width, substeps=2, output=output)
     found = method.solve(system, factors)
     assert found.status is EstimateStatus.SOLVED

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -33,21 +33,21 @@ class Request:
 
 @dataclass(slots=True, eq=False)
 class Samples:
-    """Samples of a file: times (N,), a block (N, n) of each quantity, and the file's joints."""
+    """Samples of a file: times (N,), a block (N, n) of each quantity, and the names of joints."""
 
     t: Array | None
-    blocks: dict[Quantity, Array]
-    names: tuple[str, ...] | None
-    notes: list[str]
+    blocks: dict[Quantity, Array] = field(default_factory=dict)
+    names: tuple[str, ...] | None = None
+    notes: list[str] = field(default_factory=list)
 
 
 def read_samples(table: LogTable, second: LogTable | None, request: Request) -> Samples:
     """Samples of one file, or of one with positions and one with torques."""
     torque = Quantity.TORQUE
     kinds = [kind for kind in request.columns if second is None or kind is not torque]
-    samples = _of_file(table, kinds, request, second is not None)
+    samples = _of_file(table, kinds, request, request.joints, second is not None)
     if second is not None:
-        other = _of_file(second, [torque], request, True)
+        other = _of_file(second, [torque], request, request.joints or samples.names, True)
         files = f"{table.path.name} and {second.path.name}"
         samples.blocks[torque] = _joined(samples, other, files)
         samples.notes += other.notes
@@ -65,14 +65,29 @@ def read_samples(table: LogTable, second: LogTable | None, request: Request) -> 
             f"{table.path}: the columns have {', '.join(map(str, sorted(lengths)))} samples; give "
             "times, positions and torques of one recording."
         )
-    return samples if request.joints is None else _in_order(samples, request.joints, table)
+    if request.joints is not None and len(request.joints) != n:
+        raise ShapeError(
+            f"positions: {n} columns of {table.path}, but {len(request.joints)} joints: "
+            f"{', '.join(request.joints)}."
+        )
+    samples.names = request.joints or samples.names
+    return samples
 
 
-def _of_file(table: LogTable, kinds: list[Quantity], request: Request, alone: bool) -> Samples:
-    """Quantities of a file; ``alone``: the first one may be in all columns but those of time."""
+def _of_file(
+    table: LogTable,
+    kinds: list[Quantity],
+    request: Request,
+    wanted: tuple[str, ...] | None,
+    alone: bool,
+) -> Samples:
+    """Quantities of a file, in the order of the wanted joints, else of those of the first one.
+
+    ``alone``: the first one may be in all columns but those of time.
+    """
     t, columns, notes = _times(table, request)
     taken = dict.fromkeys(columns, "time")
-    samples = Samples(t, {}, None, notes)
+    samples = Samples(t, notes=notes)
     for kind in kinds:
         name, given = kind.argument, request.columns[kind] is not None
         chosen = _columns(table, kind, request)
@@ -98,47 +113,28 @@ def _of_file(table: LogTable, kinds: list[Quantity], request: Request, alone: bo
                 )
             taken[i] = name
         check_units(table, chosen, kind, request.angle, request.gains)
-        stems = {table.names[i].rpartition("[")[0] for i in chosen if table.names}
-        notes += [
-            f"{table.path.name}: {stem} has shape (joints, samples) and was transposed."
-            for stem in sorted(stems & table.transposed)
-        ]
-        values, names = table.read(chosen), joints_of(table, kind, chosen, request.joints)
+        names = joints_of(table, kind, chosen, request.joints)
+        order = _order(names, wanted or samples.names, table)
+        if names and wanted and wanted != names and not samples.blocks:
+            listed = f"{table.path.name}: its joints are {', '.join(names)}"
+            notes.append(f"{listed}; they were taken as {', '.join(wanted)}, in this order.")
         samples.names = samples.names or names
-        samples.blocks[kind] = _permuted(values, names, samples.names)
+        samples.blocks[kind] = table.read(chosen)[:, order]
     return samples
 
 
-def _permuted(
-    values: Array, names: tuple[str, ...] | None, wanted: tuple[str, ...] | None
-) -> Array:
-    """Columns of joints in another order, if they are the same joints."""
-    if not names or not wanted or names == wanted or set(names) != set(wanted):
-        return values
-    return values[:, [names.index(name) for name in wanted]]
-
-
-def _in_order(samples: Samples, joints: tuple[str, ...], table: LogTable) -> Samples:
-    """Columns of the requested joints, in their order, where the file names joints."""
-    listed, n = samples.names or (), samples.blocks[Quantity.POSITION].shape[1]
-    named = f"{table.path.name}: its joints are {', '.join(listed)}"
-    samples.names = joints
-    if joints == listed:
-        return samples
-    if set(joints) <= set(listed):
-        order = [listed.index(name) for name in joints]
-        samples.blocks = {kind: block[:, order] for kind, block in samples.blocks.items()}
-        samples.notes.append(f"{named}; those of the model were taken, in its order.")
-    elif set(joints) & set(listed):
-        raise InvalidValueError(f"joints: expected {', '.join(joints)}; {named}. Give joints=.")
-    elif len(joints) != n:
-        raise ShapeError(
-            f"positions: {n} columns of {table.path}, but {len(joints)} joints: "
-            f"{', '.join(joints)}."
+def _order(
+    names: tuple[str, ...] | None, wanted: tuple[str, ...] | None, table: LogTable
+) -> slice | list[int]:
+    """Numbers of the wanted joints among those that the file names."""
+    if not names or not wanted or not set(names) & set(wanted):
+        return slice(None)
+    if not set(wanted) <= set(names):
+        raise InvalidValueError(
+            f"joints: expected {', '.join(wanted)}; {table.path.name}: its joints are "
+            f"{', '.join(names)}. Give joints=."
         )
-    elif listed:
-        samples.notes.append(f"{named}; they were taken as {', '.join(joints)}, in this order.")
-    return samples
+    return [names.index(name) for name in wanted]
 
 
 def _columns(table: LogTable, kind: Quantity, request: Request) -> tuple[int, ...] | None:
@@ -192,7 +188,7 @@ def _times(table: LogTable, request: Request) -> tuple[Array | None, tuple[int, 
 def _joined(positions: Samples, other: Samples, files: str) -> Array:
     """Torques of another file at each row of positions; NaN where none is near in time."""
     t, stamps = positions.t, other.t
-    tau = _permuted(other.blocks[Quantity.TORQUE], other.names, positions.names)
+    tau = other.blocks[Quantity.TORQUE]
     N = len(positions.blocks[Quantity.POSITION])
     if t is None or stamps is None or np.array_equal(t, stamps, equal_nan=True):
         if len(tau) != N:

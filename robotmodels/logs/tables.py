@@ -32,7 +32,6 @@ class LogTable:
     width: int
     source: CsvTable | list[Array | str]
     alike: int
-    transposed: frozenset[str] = frozenset()
 
     def read(self, columns: Sequence[int]) -> Array:
         """Columns of numbers, not all of them finite. Shapes: -> (N, number of columns)."""
@@ -251,12 +250,10 @@ def table_of(path: Path, stored: Mapping[str, Any], transpose: bool = True) -> L
     axes = 2 if transpose else 1
     lengths = Counter(k for x in matrices.values() for k in set(x.shape[:axes]) - {1})
     N = max(lengths, key=lambda length: (lengths[length], length))
-    turned = set()
     for name, x in matrices.items():
         rows, width = x.shape
         if transpose and rows != N and width > 1 and (width == N or rows < width):
-            turned.add(name)
-    matrices = {name: x.T if name in turned else x for name, x in matrices.items()}
+            matrices[name] = x.T
     blocks = {name: list(x.T) for name, x in matrices.items() if len(x) == N}
     count = sum(map(len, blocks.values()))
     blocks |= {name: [text] for name, text in texts.items()}
@@ -265,4 +262,4 @@ def table_of(path: Path, stored: Mapping[str, Any], transpose: bool = True) -> L
     for name, block in blocks.items():
         names += [name] if len(block) == 1 else [f"{name}[{i}]" for i in range(len(block))]
     columns = [column for block in blocks.values() for column in block]
-    return LogTable(path, tuple(names), len(names), columns, count, frozenset(turned))
+    return LogTable(path, tuple(names), len(names), columns, count)
