@@ -114,7 +114,7 @@ def _of_file(
             taken[i] = name
         check_units(table, chosen, kind, request.angle, request.gains)
         names = joints_of(table, kind, chosen, request.joints)
-        order = _order(names, wanted or samples.names, table)
+        order = _wanted_columns(names, wanted or samples.names, table)
         if names and wanted and wanted != names and not samples.blocks:
             listed = f"{table.path.name}: its joints are {', '.join(names)}"
             notes.append(f"{listed}; they were taken as {', '.join(wanted)}, in this order.")
@@ -123,7 +123,7 @@ def _of_file(
     return samples
 
 
-def _order(
+def _wanted_columns(
     names: tuple[str, ...] | None, wanted: tuple[str, ...] | None, table: LogTable
 ) -> slice | list[int]:
     """Numbers of the wanted joints among those that the file names."""

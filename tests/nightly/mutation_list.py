@@ -972,7 +972,7 @@ MUTATIONS = [
         "def join_logs(", "refused=tuple(rows for log in each for rows in log.refused)",
         "refused=first.refused", "tests/test_logs.py -k joined_logs_keep_what_all_have"),
     Mutation("logs: columns", "torques of joints in another order go back to wrong ones",
-        "def _order(", "names.index(name) for name in wanted",
+        "def _wanted_columns(", "names.index(name) for name in wanted",
         "wanted.index(name) for name in names",
         ("tests/test_logs_read.py -k"
          " torques_whose_joints_stand_in_another_order_are_put_in_that_of_the_positions")),
