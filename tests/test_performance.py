@@ -70,6 +70,8 @@ BESIDE_A_SURFACE = [
     (0.9249800320642823, 14.166352940981108, 1.146668561691413),
 ]
 
+SWEEP = [(2, d4, 1) for d4 in (0.1, 0.25, 1.6, 2.0, 2.15, 2.7, 3.1)]
+
 
 def random_arms(count, seed=7):
     """Parameters (d3, d4, r2) farther than 1e-3 from a surface."""
@@ -389,12 +391,12 @@ def proof_holds(arm, found, rows):
     "arms",
     [
         (BESIDE_A_SURFACE[0], *random_arms(8)),  # of the first a level curve is the proof
-        pytest.param((*BESIDE_A_SURFACE, *random_arms(500, 8)), marks=pytest.mark.nightly),
+        pytest.param((*BESIDE_A_SURFACE, *SWEEP, *random_arms(500, 8)), marks=pytest.mark.nightly),
     ],
     ids=["few", "many"],
 )
 def test_an_orthogonal_arm_is_cuspidal_if_and_only_if_it_has_cusps(arms):
-    for p in (*arms, *((2, d4, 1) for d4 in (0.1, 0.25, 1.6, 2.0, 2.15, 2.7, 3.1))):
+    for p in (*arms, *BESIDE_A_SURFACE[1:], *SWEEP):
         count, cusps = published_cusps(*p)[0], pf.cusps(three(*p))
         assert (*p, len(cusps), cusps.status.name) == (*p, count, "FOUND")
         if p in arms:

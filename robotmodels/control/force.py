@@ -25,14 +25,21 @@ inverse : {"consistent", "jacobian"}
     forces in its null space. ``"jacobian"``: joint servos of equal gains through ``J^-1 S``, the
     historical form; it is unstable in some postures of revolute arms (An and Hollerbach).
 stiffness, gain : float or array_like
-    Of the environment that the controller assumes, N/m (N m/rad); bandwidth of the external
-    loop, 1/s.
+    Of the environment that the controller assumes, N/m (N m/rad), or of the wall; bandwidth of the
+    external loop, 1/s.
+point, normal : array_like, shape (3,)
+    Point of the undeformed wall in the world, m; direction to the free side, of any length.
+damping, friction, slip : float
+    Of the wall, N s/m; coefficient of its dry friction, and velocity below which that is smoothed,
+    m/s.
+bilateral : bool
+    Whether the wall holds the tool on both sides: a spring.
 
 References
 ----------
-Book sections 5.3.3 to 5.3.6; J. Craig, "Introduction to Robotics", section 11.4; M. Raibert
-and J. Craig, ASME J. Dyn. Syst. Meas. Control 103(2), 1981; O. Khatib, IEEE J. Robotics and
-Automation 3(1), 1987; C. An and J. Hollerbach, IEEE ICRA 1987; W. Fisher and M. Mujtaba, Int. J.
+Book sections 5.3.1 and 5.3.3 to 5.3.6; J. Craig, "Introduction to Robotics", section 11.4;
+M. Raibert and J. Craig, ASME J. Dyn. Syst. Meas. Control 103(2), 1981; O. Khatib, IEEE J. Robotics
+and Automation 3(1), 1987; C. An and J. Hollerbach, ICRA 1987; W. Fisher and M. Mujtaba, Int. J.
 Robotics Research 11(4), 1992; J. De Schutter and H. Van Brussel, ibid. 7(4), 1988.
 
 Examples
@@ -55,6 +62,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import (
     Array,
+    Frozen,
     Value,
     as_core,
     as_exact,
@@ -62,7 +70,6 @@ from .._arrays import (
     as_mask,
     as_number,
     batch_shape,
-    read_only,
 )
 from .._choices import one_of
 from ..dynamics import mass_matrix
@@ -74,6 +81,7 @@ from .task_laws import ComputedTorque, Impedance, TaskLaw, as_flags
 
 _NOWHERE = np.eye(4), np.zeros(6), np.zeros(6)
 _FED = {"measured": 6, "desired": 7}
+_OF_WALLS = {"stiffness": "above", "slip": "above", "damping": "least", "friction": "least"}
 _FORCE_GAINS = 400.0, 40.0, 2000.0  # kp, kv, ke of hybrid laws given a wrench alone
 
 
@@ -143,9 +151,7 @@ class _Split(TaskLaw):
         selection = as_mask(self.selection, name="selection")
         self._set_rows(np.kron(np.eye(2), as_single_pose(T, frame)[:3, :3].T))
         if not selection[self.rows].any():
-            raise InvalidValueError(
-                "selection: expected a force-controlled component of the task, got none."
-            )
+            raise InvalidValueError("selection: expected a force-controlled component, got none.")
         position, force = self.position, self.force
         if not isinstance(position, ComputedTorque):
             position = ComputedTorque(position, model=self.model, space="task")
@@ -280,27 +286,12 @@ class ExternalForceLoop(TaskLaw):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SpringWall(Value):
+class SpringWall(Frozen, Value):
     """An elastic wall: the wrench that a tool exerts on it, as a function of its motion.
 
     The tool point pushes with ``stiffness depth + damping depth'``, never pulls unless the wall is
-    bilateral, and rubs with Coulomb friction ``friction |push|`` along its sliding velocity,
-    smoothed below `slip`. A tool is a point: there are no moments.
-
-    Parameters
-    ----------
-    point, normal : array_like, shape (3,)
-        Point of the undeformed surface in the world, m; direction to the free side, of any length.
-    stiffness, damping, friction : float
-        N/m, N s/m, and the coefficient of dry friction.
-    bilateral : bool
-        Whether it holds the tool on both sides: a spring.
-    slip : float
-        Sliding velocity below which friction is smoothed, m/s.
-
-    References
-    ----------
-    Book section 5.3.1.
+    bilateral, and rubs with Coulomb friction ``friction |push|`` along its sliding velocity. A
+    tool is a point: there are no moments.
 
     Examples
     --------
@@ -324,15 +315,12 @@ class SpringWall(Value):
         if not normal.any():
             raise InvalidValueError("normal: expected a vector that is not zero.")
         normal = normal / np.abs(normal).max()
-        for bound, names in (("above", ("stiffness", "slip")), ("least", ("damping", "friction"))):
-            for name in names:
-                object.__setattr__(self, name, as_number(getattr(self, name), name, **{bound: 0.0}))
-        if not isinstance(self.bilateral, (bool, np.bool_)):
-            raise InvalidValueError(
-                f"bilateral: expected True or False, got {self.bilateral!r:.40}."
-            )
-        object.__setattr__(self, "point", read_only(as_exact(self.point, (3,), "point")))
-        object.__setattr__(self, "normal", read_only(normal / np.linalg.norm(normal)))
+        given: dict[str, Any] = {"normal": normal / np.linalg.norm(normal)}
+        for name, bound in _OF_WALLS.items():
+            given[name] = as_number(getattr(self, name), name, **{bound: 0.0})
+        for name, value in (given | {"point": as_exact(self.point, (3,), "point")}).items():
+            object.__setattr__(self, name, value)
+        Frozen.__post_init__(self)
 
     def __call__(self, t: float, T: ArrayLike, twist: ArrayLike) -> Array:
         """Wrench (..., 6) on the wall, world axes, for poses (..., 4, 4) and twists (..., 6)."""

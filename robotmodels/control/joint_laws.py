@@ -66,7 +66,7 @@ from ..model import RobotModel, check_model
 from ..regressors import parameter_names, parameter_vector
 from ..regressors.columns import LINKS, ChosenColumns, chosen_columns, standard_blocks
 from ..regressors.drives import add_torques, friction_terms, rotor_terms
-from .law import Desired, Law, check_single, started, virtual_torques
+from .law import Desired, Law, started, virtual_torques
 
 _REMAINS = 0.2
 """Part of an error of a parameter that remains where the motion excites it too little."""
@@ -90,8 +90,7 @@ class PIDGains(Value):
     @property
     def critical_ki(self) -> float:
         """Integral gain at the limit of stability (Routh): ``(kd + viscous) kp / inertia``."""
-        inertia = as_number(self.inertia, "inertia", above=0.0)
-        return (self.kd + self.viscous) * self.kp / inertia
+        return (self.kd + self.viscous) * self.kp / self.inertia
 
     @property
     def margin(self) -> float:
@@ -163,12 +162,10 @@ class DecentralizedPID(JointLaw):
     state0: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        given = self.feedforward
-        model = given if isinstance(given, RobotModel) else None
-        self._prepare(("kp", "ki", "kd"), model, zero="ki")
-        self._set(state0=np.zeros(self.n))
-        if given is not None and not isinstance(given, RobotModel):
-            self._set(feedforward=as_exact(given, (self.n,), "feedforward"))
+        given, is_model = self.feedforward, isinstance(self.feedforward, RobotModel)
+        self._prepare(("kp", "ki", "kd"), given if is_model else None, zero="ki")
+        given = given if is_model or given is None else as_exact(given, (self.n,), "feedforward")
+        self._set(state0=np.zeros(self.n), feedforward=given)
 
     def _torques(self, t: float, q: Array, v: Array, x: Array, f: Array) -> Array:
         q_d, v_d, a_d = self._desired(t)
@@ -308,7 +305,6 @@ class AdaptiveSlotineLi(SurfaceLaw):
 
     def regressor(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
         """Y, shape (n, p), and s, shape (n,)."""
-        check_single(q, v)
         v_r, a_r = self._rates(t, q, v)
         rows = (x.reshape(1, -1) for x in (q, started(v, v_r), v_r, a_r))
         return _regressors(self.model, self._chosen, *rows)[0], v_r - v
@@ -340,6 +336,5 @@ class AdaptiveSlotineLi(SurfaceLaw):
         size, axes = np.linalg.eigh(np.einsum("k,kij,kil->jl", weights, Y, Y))
         remains = (axes * axes) @ np.exp(-np.maximum(size, 0.0))
         few = [name for name, part in zip(self.names, remains, strict=True) if part > _REMAINS]
-        names = ", ".join(few)
-        sentence = f"The motion excites these parameters too little to estimate: {names}."
-        return (sentence,) if few else ()
+        words = "The motion excites these parameters too little to estimate"
+        return (f"{words}: {', '.join(few)}.",) if few else ()

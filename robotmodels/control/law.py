@@ -81,15 +81,13 @@ class Law(Value):
         """
         for name in names:
             gains = as_floats(getattr(self, name), name)
-            if rows is not None and gains.shape == (6,):
-                gains = gains[rows]
-            if gains.ndim > 1 or (gains.ndim == 1 and n is not None and gains.size != n):
-                wanted = "(n,)" if n is None else f"({n},)"
-                more = "" if rows is None else " or (6,)"
+            gains = gains[rows] if rows is not None and gains.shape == (6,) else gains
+            if gains.ndim and (gains.ndim > 1 or n not in (None, gains.size)):
                 raise ShapeError(
-                    f"{name}: expected one number or shape {wanted}{more}, got {gains.shape}."
+                    f"{name}: expected one number, or one for each of {n or 'n'} joints or "
+                    f"components of the task, got shape {gains.shape}."
                 )
-            if not (gains > 0.0).all() and not (name == zero and (gains >= 0.0).all()):
+            if not ((gains >= 0.0) if name == zero else (gains > 0.0)).all():
                 least = "at least 0" if name == zero else "above 0"
                 raise InvalidValueError(f"{name}: expected gains {least}, got {gains.tolist()}.")
             self._set(**{name: gains if rows is None else np.full(len(rows), gains)})
@@ -100,32 +98,24 @@ class Law(Value):
         """Check the reference: of joints (their number is the answer), a pose or a wrench."""
         given = getattr(self, name)
         desired = desired_of(given, shapes, name)
-        if not (callable(given) or isinstance(given, (Trajectory, PoseTrajectory))):
-            given = desired(0.0)[0]
-        self._set(_desired=desired, **{name: given})
-        size = desired(0.0)[0].size
-        if not size:
-            raise ShapeError(f"{name}: expected positions of at least one joint, got none.")
-        if n is not None and size != n:
-            raise ShapeError(f"{name}: expected {n} joints, those of the model, got {size}.")
-        return size
+        first = desired(0.0)[0]
+        moves = callable(given) or isinstance(given, (Trajectory, PoseTrajectory))
+        self._set(_desired=desired, **{name: given if moves else first})
+        if not first.size or n not in (None, first.size):
+            raise ShapeError(
+                f"{name}: expected {n or 'one or more'} joints, those of the model, "
+                f"got {first.size}."
+            )
+        return first.size
 
     def _measured(self, t: Any, q: Any, v: Any, x: Any, wrench: Any) -> tuple[Any, ...]:
         """Checked t, q, v, x and wrench; the wrench is zero without a sensor."""
-        k, n = self.state0.size, self.n
-        return (
-            t if isinstance(t, float) and isfinite(t) else as_number(t, "t"),
-            as_vector(q, n, "q"),
-            as_vector(v, n, "v"),
-            as_vector(x, k, "x") if k or np.size(x) else NONE,
-            NO_WRENCH if wrench is None else as_vector(wrench, 6, "wrench"),
-        )
-
-
-def check_single(q: Array, v: Array) -> None:
-    """Refuse several postures."""
-    if q.ndim != 1 or v.ndim != 1:
-        raise ShapeError(f"q, v: expected one posture, shape (n,), got {q.shape}, {v.shape}.")
+        k, q, v = self.state0.size, as_vector(q, self.n, "q"), as_vector(v, self.n, "v")
+        if q.ndim != 1 or v.ndim != 1:
+            raise ShapeError(f"q, v: expected one posture, shape (n,), got {q.shape}, {v.shape}.")
+        t = t if isinstance(t, float) and isfinite(t) else as_number(t, "t")
+        x = as_vector(x, k, "x") if k or np.size(x) else NONE
+        return t, q, v, x, NO_WRENCH if wrench is None else as_vector(wrench, 6, "wrench")
 
 
 def desired_of(reference: Any, shapes: Any = None, name: str = "reference") -> Desired:

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
-from textwrap import shorten
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Frozen, Value, as_exact, as_floats, as_number, as_vector
-from .._outcomes import Outcome
+from .._arrays import Array, as_exact, as_floats, as_number
+from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError, ShapeError
 from ..kinematics import dgm, jacobian
 from ..kinematics.singular.task import generator_of
@@ -41,21 +40,13 @@ class ControlStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ControlledMotion(Frozen, Value):
+class ControlledMotion(Result):
     """Motion of a controlled robot. Read-only.
 
-    Parameters
-    ----------
-    law, simulation : object and Simulation
-        The control law; the motion of the plant, N samples, n joints.
-    error : ndarray, shape (N, k)
-        Error of the law: desired less actual joints, components of the task, or forces.
-    wrench : ndarray, shape (N, 6)
-        Wrench ``[f; m]`` of the tool on the environment, world axes.
-    lyapunov : ndarray, shape (N,), or None
-        Lyapunov function of the law, None if it has none.
-    status, notes : ControlStatus and tuple of str
-        Outcome, and sentences that explain it.
+    ``simulation`` is that of the plant, N samples; ``error`` (N, k) of the law: desired less actual
+    joints, components of the task, or forces; ``wrench`` (N, 6) ``[f; m]`` of the tool on the
+    environment, world axes; ``lyapunov`` (N,) the Lyapunov function of the law, None if it has
+    none; ``status`` and ``notes`` the outcome, and sentences that explain it.
     """
 
     law: Any
@@ -92,20 +83,9 @@ class ControlledMotion(Frozen, Value):
         weights = np.convolve(np.diff(self.t[late]), [0.5, 0.5]) if late.sum() > 1 else np.ones(1)
         return np.sqrt(weights @ self.error[late] ** 2 / weights.sum())
 
-    def reason(self) -> str:
+    def reason(self, i: Any = ()) -> str:
         """The sentence of the status, and what explains it."""
         return " ".join([self.status.sentence, *self.notes])
-
-    def __repr__(self) -> str:
-        last = self.rms(float(self.t[0] + 0.9 * (self.t[-1] - self.t[0])))
-        shown = np.array2string(last, precision=3, max_line_width=200, threshold=8)
-        lines = (
-            f"<ControlledMotion: {shorten(repr(self.law), 90, placeholder=' ...')}",
-            f"  {self.t[-1] - self.t[0]:.6g} s, samples: {len(self.t)}",
-            f"  root mean square error of the last tenth: {shown:.70}",
-            f"  {self.reason():.200}>",
-        )
-        return "\n".join(lines)
 
 
 def run(
@@ -129,10 +109,9 @@ def run(
 
     Parameters
     ----------
-    model : RobotModel
-        The plant, n joints; the model that the law uses may differ.
-    law : object
-        A control law: ``command(t, q, v, x)`` (n,), ``state0`` (k,), ``rate(t, q, v, x)`` (k,).
+    model, law : RobotModel and object
+        The plant, which may differ from the model of the law; a law: ``command(t, q, v, x)`` (n,),
+        ``state0`` (k,), ``rate(t, q, v, x)`` (k,).
     q0, v0 : array_like, shape (n,)
         Positions and velocities at the start; default at rest.
     t : array_like
@@ -143,18 +122,13 @@ def run(
     disturbance : callable or array_like (n,), optional
         Torques that act on the joints, a function of (t, q, v) or constant.
     period, delay : float, optional
-        Sampling period of the law, default continuous, which laws that switch need; time from a
-        sample to its torque, s.
+        Sampling period, which laws that switch need, default continuous; time from a sample to its
+        torque, s.
     noise, rng : float or array_like; int or Generator, optional
         Standard deviation of what is measured at samples: one number for positions and velocities,
         or two, or three with that of wrenches; seed.
     **options
         ``method`` (``"Radau"`` for stiff walls), ``max_evaluations``, ``progress`` of `simulate`.
-
-    Returns
-    -------
-    ControlledMotion
-        Motion, errors, torques, wrenches and the status.
 
     References
     ----------
@@ -170,7 +144,7 @@ def run(
     (<ControlStatus.FOLLOWED: 0>, True)
     """
     check_model(model)
-    if not (callable(getattr(law, "command", None)) and callable(getattr(law, "rate", None))):
+    if not all(callable(getattr(law, name, None)) for name in ("command", "rate")):
         raise InvalidValueError(
             f"law: expected a control law with command, state0 and rate, got {law!r:.60}."
         )
@@ -182,9 +156,6 @@ def run(
         raise InvalidValueError(
             "law: it switches, which takes time steps: give a sampling period, or a boundary layer."
         )
-    for name, instead in (("wrench", "environment="), ("control", "law=")):
-        if name in options:
-            raise InvalidValueError(f"{name}: give {instead} of run.")
     times = as_floats(t, "t")
     if times.ndim == 0 and times > 0.0:
         ratio = float(times) / period if period else _SAMPLES
@@ -257,10 +228,8 @@ class Loop:
 
     def error(self, t: float, q: Array, v: Array, wrench: Array) -> Array:
         """Error of the law, empty for a law without."""
-        if not hasattr(self.law, "error"):
-            return np.zeros(0)
-        e = self.law.error(t, q, v, wrench) if self.feels else self.law.error(t, q, v)
-        return as_vector(e, np.size(e), "law.error(t, q, v)")
+        error = getattr(self.law, "error", lambda *_: np.zeros(0))
+        return as_floats(error(t, q, v, *(wrench,) * self.feels), "law.error(t, q, v)")
 
     def _measured(self, t: float, q: Array, v: Array, x: Array) -> tuple[Array, ...]:
         f = self.wrench(t, q, v) if self.feels and self.walls else None
@@ -278,13 +247,12 @@ def _deviations(noise: Any, rng: Any, period: Any) -> tuple[float, ...] | None:
     if noise is None:
         return None
     given = np.atleast_1d(as_floats(noise, "noise"))
-    if given.ndim != 1 or not 1 <= given.size <= 3 or (given < 0.0).any():
+    if given.shape not in ((1,), (2,), (3,)) or (given < 0.0).any():
         raise InvalidValueError(
             f"noise: expected one to three standard deviations, none negative, got {noise!r:.40}."
         )
-    for value, name in ((rng, "rng, a seed or a Generator"), (period, "period: it is of samples")):
-        if value is None:
-            raise InvalidValueError(f"noise: give {name}.")
+    if rng is None or period is None:
+        raise InvalidValueError("noise: give rng, a seed or a Generator, and a sampling period.")
     return tuple(given) if given.size == 3 else (given[0], given[-1], 0.0)
 
 

@@ -148,38 +148,25 @@ def first_order(
     if end / h > _MOST_STEPS:
         raise InvalidValueError(f"step: {h:.3g} s would take more than {_MOST_STEPS} steps.")
     s = as_floats(s0, "s0")
-    x = np.zeros(s.shape)
-    own: Any = law
-    reaching: Any = getattr(law, "reaching", None)
-    if reaching is None and not callable(law):
+    x, out = np.zeros(s.shape), np.empty((round(end / h) + 1, *s.shape))
+    if not isinstance(law, _Sliding) and not callable(law):
         raise InvalidValueError(
             f"law: expected a sliding mode or a function of s, got {type(law).__name__}."
         )
-    for name in ("gain", "layer", "k1", "k2") if reaching else ():
-        _fitting(getattr(law, name, 0.0), s, name)
     constant = 0.0 if disturbance is None else disturbance
     push: Any = disturbance if callable(disturbance) else lambda t: constant
-    out = np.empty((round(end / h) + 1, *s.shape))
+    own: Any = law.reaching if isinstance(law, _Sliding) else lambda s, x: (law(s), NONE)
     out[0] = s
     with np.errstate(over="ignore", invalid="ignore"):  # refused below
         for k in range(1, len(out)):
-            rate, change = reaching(s, x) if reaching else (_fitting(own(s), s, "law(s)"), NONE)
-            s = out[k] = s + h * (rate + _fitting(push((k - 1) * h), s, "disturbance"))
-            x = x + h * change if change.size else x
+            rate, change = own(s, x)
+            s = s + h * (as_reals(rate, "law(s)") + as_reals(push((k - 1) * h), "disturbance"))
+            if s.shape != x.shape:
+                raise ShapeError(
+                    f"law, disturbance: expected one number or shape {x.shape}, that of s0, got "
+                    f"{s.shape}."
+                )
+            out[k], x = s, x + h * change if change.size else x
     if not np.isfinite(out).all():
         raise InvalidValueError("law, disturbance: s is not finite; expected finite values.")
     return out
-
-
-def _fitting(value: ArrayLike, s: Array, name: str) -> Array:
-    """Numbers that broadcast to the shape of s."""
-    array = as_reals(value, name)
-    try:
-        fits = array.shape == () or np.broadcast_shapes(array.shape, s.shape) == s.shape
-    except ValueError:
-        fits = False
-    if not fits:
-        raise ShapeError(
-            f"{name}: expected one number or shape {s.shape}, that of s0, got {array.shape}."
-        )
-    return array

@@ -41,7 +41,7 @@ from .._choices import one_of
 from ..errors import InvalidValueError, SingularMassMatrixError
 from ..kinematics import dgm, jacobian
 from ..model import RobotModel, check_model
-from .law import NO_WRENCH, POSE, Desired, Law, check_single, model_torques
+from .law import NO_WRENCH, POSE, Desired, Law, model_torques
 
 _RANK = 1e-9  # relative singular value of rows that depend
 _FIRST = np.zeros(6, dtype=np.int64)
@@ -81,9 +81,8 @@ class TaskLaw(Law):
             ranks = np.linalg.matrix_rank(J[:, [*rows, row]], rtol=_RANK)
             if len(rows) < n and (ranks > len(rows)).any():
                 rows.append(row)
-        axes = turn[rows]
-        self._set(rows=np.array(rows, dtype=np.int64), mask=as_flags(mask))
-        self._set(_axes=None if np.array_equal(axes, np.eye(6)) else axes)
+        axes = None if rows == [*range(6)] and np.array_equal(turn, np.eye(6)) else turn[rows]
+        self._set(rows=np.array(rows, dtype=np.int64), mask=as_flags(mask), _axes=axes)
 
     def _tool(
         self: Any, q: Array, v: Array, desired: tuple[Array, ...], wrench: Array, *more: Array
@@ -92,7 +91,6 @@ class TaskLaw(Law):
 
         Also the joint torques of the wrench.
         """
-        check_single(q, v)
         model, J, rows = self.model, np.empty((2, 6, len(q))), np.empty((6 + len(more), 6))
         frame = model.twin.frame(self.frame).kernel_arguments
         _kernels().tool_errors(q[None], v[None], model.chain, *frame, *desired, wrench, J, rows)

@@ -8,6 +8,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from .._choices import one_of
 from ..drive import DriveKind, Drives, drive_kinds
 from ..dynamics import ddm
 from ..dynamics.direct import free_motion
@@ -17,7 +18,7 @@ from ..model import RobotModel, check_model
 from ..regressors import parameter_names
 from . import inputs, recursion
 from .inputs import Draft, comment
-from .source import Program, check_choice
+from .source import Program
 from .tape import Number, Port
 
 ModelName = Literal[
@@ -162,11 +163,9 @@ def program(
 
 def _check(kind: str, given: dict[str, Any]) -> None:
     """Refuse unknown models and choices, and arguments that a model does not have."""
-    check_choice(kind, _KINDS, "kind")
-    check_choice(given["parameters"], ("numbers", "symbols", "base"), "parameters")
-    check_choice(given["geometry"], ("numbers", "symbols"), "geometry")
-    if not isinstance(given["wrench"], (bool, np.bool_)):
-        raise InvalidValueError(f"wrench: expected True or False, got {given['wrench']!r:.60}.")
+    one_of(kind, tuple(_KINDS), "kind")
+    one_of(given["parameters"], ("numbers", "symbols", "base"), "parameters")
+    one_of(given["geometry"], ("numbers", "symbols"), "geometry")
     for name, value in given.items():
         is_default = value is None if name == "frame" else value in ("numbers", False)
         if name not in _KINDS[kind].accepts and not is_default:

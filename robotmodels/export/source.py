@@ -6,7 +6,7 @@ are used once are written into the line that uses them.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_core, batch_shape
-from ..errors import InvalidValueError, nearest_names
+from .._choices import one_of
+from ..errors import InvalidValueError
 from .tape import RUN, OperationCount, Operations, Port
 
 _WIDEST = 60  # columns of what is written into another line
@@ -98,7 +99,7 @@ class Program:
         ``"c"`` (C99), ``"python"`` (plain), ``"numpy"`` (batch axes), ``"casadi"`` or ``"matlab"``:
         one function, self-contained, the same text every time.
         """
-        return _file(self, check_choice(str(language).lower(), LANGUAGES, "language"))
+        return _file(self, one_of(str(language).lower(), tuple(LANGUAGES), "language"))
 
     def __repr__(self) -> str:
         ports = [", ".join(f"{p.name} {p.shape}" for p in of) for of in (self.inputs, self.outputs)]
@@ -213,16 +214,6 @@ LANGUAGES = {
     ),
 }  # fmt: skip
 """By name, in the order of the documentation."""
-
-
-def check_choice(value: Any, allowed: Collection[str], name: str) -> str:
-    """Refuse what is none of some words."""
-    if not isinstance(value, str) or value not in allowed:
-        near = nearest_names(str(value), allowed)
-        hint = f" Did you mean {near[0]!r}?" if near else ""
-        listed = ", ".join(map(repr, allowed))
-        raise InvalidValueError(f"{name}: expected one of {listed}, got {value!r:.60}.{hint}")
-    return value
 
 
 def _file(program: Program, language: str) -> str:

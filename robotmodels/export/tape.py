@@ -30,10 +30,7 @@ _FUNCTIONS = ("sin", "cos", "exp", "log", "sqrt", "sign", "floor", "atan2")
 class OperationCount(NamedTuple):
     """Operations of a program; signs and comparisons are not counted.
 
-    Parameters
-    ----------
-    multiplications, additions, functions, divisions : int
-        Products; sums and differences; sines, cosines, square roots and others; quotients.
+    Sums and differences are additions; sines, cosines, square roots and others are functions.
 
     Examples
     --------

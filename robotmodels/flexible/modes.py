@@ -34,7 +34,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Frozen, Value, as_exact, as_floats
+from .._arrays import Array, Frozen, Value, as_count, as_exact, as_floats
 from ..errors import InvalidValueError, ShapeError
 from .link import FlexibleLink, Section, integrals
 
@@ -139,15 +139,14 @@ def craig_bampton(
         )
     k = chosen[0].ravel().astype(np.int64)
     inner = np.setdiff1d(np.arange(c), named.astype(np.int64))
-    if not isinstance(modes, int | np.integer) or not 0 <= modes <= len(inner):
-        raise InvalidValueError(f"modes: expected 0 to {len(inner)}, got {modes!r:.40}.")
-    T = np.zeros((c, len(k) + int(modes)))
+    modes = as_count(modes, "modes", 0, len(inner))
+    T = np.zeros((c, len(k) + modes))
     T[k, np.arange(len(k))] = 1.0
     try:
         if len(inner):
             inside = np.ix_(inner, inner)
             T[inner, : len(k)] = -np.linalg.solve(K[inside], K[np.ix_(inner, k)])
-            T[inner, len(k) :] = eigh(K[inside], M[inside])[1][:, : int(modes)]
+            T[inner, len(k) :] = eigh(K[inside], M[inside])[1][:, :modes]
         values, V = eigh(T.T @ K @ T, T.T @ M @ T)
     except LinAlgError:
         raise InvalidValueError(

@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, Value, as_each, read_only
+from .._arrays import Array, Value, as_count, as_each, read_only
+from .._choices import as_instance
 from ..errors import InvalidValueError
 from ..kernels import Chain
 from ..model import RobotModel, check_model
@@ -162,22 +163,14 @@ class FlexibleRobot(Value):
 
 def check_arm(arm: Any) -> FlexibleRobot:
     """The argument, if it is a flexible robot."""
-    if isinstance(arm, FlexibleRobot):
-        return arm
-    raise InvalidValueError(f"arm: expected a FlexibleRobot, got {type(arm).__name__}.")
+    return as_instance(arm, FlexibleRobot, "arm")
 
 
 def _checked_links(model: RobotModel, links: Any) -> dict[int, FlexibleLink]:
     """Links by row in the order of rows."""
-    if not isinstance(links, Mapping) or not all(
-        isinstance(link, FlexibleLink) for link in links.values()
-    ):
-        raise InvalidValueError(
-            f"links: expected a mapping such as {{2: beam(...)}}, got {links!r:.40}."
-        )
-    for row in links:
-        if type(row) is bool or row not in range(1, model.f + 1):
-            raise InvalidValueError(f"links: expected rows 1 to {model.f}, got {row!r:.20}.")
+    for row, link in as_instance(links, Mapping, "links", " such as {2: beam(...)}").items():
+        as_instance(link, FlexibleLink, f"links[{row!r:.20}]")
+        as_count(row, "links", 1, model.f)
         if model.table.sigma[row - 1] == 1:
             raise InvalidValueError(
                 f"links: row {row} is a sliding joint; put the link on a fixed row behind it."

@@ -50,7 +50,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact, as_number
 from .._arrays.tasks import Progress, Workers
-from .._choices import chosen
+from .._choices import as_instance, chosen
 from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError, SingularMassMatrixError
 from ..geometry import DHTable
@@ -345,8 +345,7 @@ def free_body(
     from scipy.linalg import eigvalsh
     from scipy.spatial.transform import Rotation
 
-    if not isinstance(link, FlexibleLink):
-        raise InvalidValueError(f"link: expected a FlexibleLink, got {type(link).__name__}.")
+    as_instance(link, FlexibleLink, "link")
     m, inv = link.m, link.invariants
     given = (("e0", e0, m), ("e_v0", e_v0, m), ("v0", v0, 6))
     start = [as_exact(np.zeros(k) if x is None else x, (k,), name) for name, x, k in given]

@@ -31,13 +31,8 @@ _OPEN = (ClosingStatus.CANNOT_CLOSE, ClosingStatus.NOT_CONVERGED)
 class ClosedPostures(Result):
     """Postures with closed loops, or the ones with the least residual. Read-only, picklable.
 
-    Parameters
-    ----------
-    q : ndarray, shape (..., n)
-        Joint variables of all joints, rad or m.
-    residual, status : ndarray, shape (...)
-        Largest distance (m) or angle (rad) between the frames of a closure; codes of
-        `ClosingStatus`.
+    ``q`` (..., n) of all joints, rad or m; ``residual`` (...), the largest distance (m) or angle
+    (rad) between the frames of a closure; ``status`` (...), codes of `ClosingStatus`.
     """
 
     q: Array
@@ -52,9 +47,6 @@ class ClosedPostures(Result):
             return status.sentence
         return f"{status.sentence} Least residual: {np.ravel(self.residual[i])[0]:.3g} m or rad."
 
-    def __repr__(self) -> str:
-        return f"<ClosedPostures, q {self.q.shape}: {self.counted}>"
-
 
 def close(
     robot: LoopedRobot, q_actuated: ArrayLike, q_guess: ArrayLike | None = None
@@ -68,18 +60,11 @@ def close(
 
     Parameters
     ----------
-    robot : LoopedRobot
-        The robot, n joints, n_a of them actuated.
     q_actuated : array_like, shape (..., n_a)
         Positions of the actuated joints, rad or m.
     q_guess : array_like, shape (..., n) or (..., n - n_a), optional
         Posture of all joints in the desired assembly, or positions of the passive joints; default
         passive joints at zero.
-
-    Returns
-    -------
-    ClosedPostures
-        ``.q (..., n)``, ``.residual (...)``, ``.status (...)``.
 
     References
     ----------

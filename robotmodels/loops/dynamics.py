@@ -152,14 +152,11 @@ def tree_torques(
 def closed(robot: LoopedRobot, q: Array) -> Array:
     """The same posture, refused where a loop is open."""
     residual = np.abs(closure_rows(robot, q)[0] * np.sqrt(robot.cuts.weight))
-    residual = residual.reshape(int(np.prod(q.shape[:-1])), len(robot.rows))
-    for i in np.flatnonzero((residual > _OPEN).any(axis=-1))[:1]:
-        row = robot.rows[int(np.argmax(residual[i]))]
-        where = f" of sample {i}" if q.ndim > 1 else ""
+    for i in np.argwhere(residual > _OPEN)[:1].tolist():
         raise LoopError(
-            f"q: the loops of {robot.name!r} are open in the posture{where}: {row} is off by "
-            f"{residual[i].max():.3g} of the robot's size, or rad. Close them: "
-            "close(robot, q_actuated, q_guess).q."
+            f"q: the loops of {robot.name!r} are open in posture {tuple(i[:-1])}: "
+            f"{robot.rows[i[-1]]} is off by {residual[*i]:.3g} of the robot's size, or rad. Close "
+            "them: close(robot, q_actuated, q_guess).q."
         )
     return q
 

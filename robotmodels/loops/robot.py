@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array, Value, as_floats, read_only
+from .._choices import as_instance, one_of
 from ..errors import InvalidValueError, LoopError
 from ..geometry import PRISMATIC
 from ..minimal_parameters.rules import reach
@@ -47,11 +48,10 @@ class Closure:
     kind: str = "revolute"
 
     def __post_init__(self) -> None:
-        pair, kinds = self.frames, ", ".join(map(repr, ROWS))
-        if not isinstance(self.name, str) or not self.name:
-            raise InvalidValueError(f"name: expected a text, not empty, got {self.name!r:.60}.")
-        if not isinstance(self.kind, str) or self.kind not in ROWS:
-            raise InvalidValueError(f"kind: expected one of {kinds}, got {self.kind!r:.60}.")
+        pair = self.frames
+        if not as_instance(self.name, str, "name"):
+            raise InvalidValueError("name: expected a text, not empty.")
+        one_of(self.kind, tuple(ROWS), "kind")
         if isinstance(pair, str) or not isinstance(pair, Iterable) or len(tuple(pair)) != 2:
             raise InvalidValueError(
                 f"frames: expected two frames of the tree such as (4, 7), got {pair!r:.60}."
@@ -113,16 +113,9 @@ class LoopedRobot(Value):
     scratch: Any = field(init=False)
 
     def __post_init__(self) -> None:
-        tree, given = self.tree, self.closures
-        if not isinstance(tree, RobotModel):
-            raise InvalidValueError(
-                f"tree: expected the RobotModel of a spanning tree, got {type(tree).__name__}."
-            )
+        tree, given = as_instance(self.tree, RobotModel, "tree"), self.closures
         closures = tuple(given) if isinstance(given, Iterable) else (given,)
-        for k, closure in enumerate(closures):
-            if not isinstance(closure, Closure):
-                raise InvalidValueError(f"closures[{k}]: expected a Closure, got {closure!r:.60}.")
-        names = [closure.name for closure in closures]
+        names = [as_instance(x, Closure, f"closures[{k}]").name for k, x in enumerate(closures)]
         if len(set(names)) < len(names):
             raise InvalidValueError(f"closures: each needs its own name, got {', '.join(names)}.")
         actuated, cuts = _actuated(tree, self.actuated), _cuts(tree, closures)
@@ -149,12 +142,9 @@ class LoopedRobot(Value):
         return self.tree.name
 
     def __repr__(self) -> str:
-        listed = [f"{c.name} ({c.kind})" for c in self.closures[:4]] or ["none"]
-        more = f" and {len(self.closures) - 4} more" if len(self.closures) > 4 else ""
-        return (
-            f"<LoopedRobot {self.name!r}: {self.n} joints, actuated {self.actuated.tolist()}, "
-            f"closures: {', '.join(listed)}{more}>"
-        )
+        listed = ", ".join(f"{c.name} ({c.kind})" for c in self.closures) or "none"
+        joints = f"{self.n} joints, actuated {self.actuated.tolist()}"
+        return f"<LoopedRobot {self.name!r}: {joints}, closures: {listed}>"
 
     @property
     def _values(self) -> tuple[Any, ...]:
@@ -168,10 +158,7 @@ def scaled(robot: LoopedRobot, J: Array) -> Array:
 
 def check_looped(robot: object) -> None:
     """Raise unless the argument is a looped robot."""
-    if not isinstance(robot, LoopedRobot):
-        raise InvalidValueError(
-            f"robot: expected a LoopedRobot(tree, closures, actuated), got {type(robot).__name__}."
-        )
+    as_instance(robot, LoopedRobot, "robot", "(tree, closures, actuated)")
 
 
 def _actuated(tree: RobotModel, actuated: Any) -> NDArray[np.int64]:

@@ -47,8 +47,6 @@ def simulate(
 
     Parameters
     ----------
-    robot : LoopedRobot
-        The robot, n joints, n_a of them actuated.
     q0, v0 : array_like, shape (n,)
         Positions (rad or m) of all joints, which close the loops, and velocities; default at rest.
     control : callable, or array_like of shape (n_a,) or (N, n_a), optional

@@ -55,6 +55,7 @@ from numpy.typing import ArrayLike
 
 from .. import se3
 from .._arrays import Array, as_each, as_exact, as_floats, as_number
+from .._choices import one_of
 from ..errors import InvalidValueError, ShapeError
 from .legs import leg_states
 from .robot import Family, ParallelRobot, pose_at
@@ -85,8 +86,7 @@ def gough_symmetric(
     big = as_number(radius, "radius", above=0.0)
     given = 0.6 * big if platform_radius is None else platform_radius
     small, third = as_number(given, "platform_radius", above=0.0), 2.0 * np.pi / 3.0
-    if kind not in ("SSM", "TSSM", "MSSM"):
-        raise InvalidValueError(f"kind: expected one of SSM, TSSM, MSSM, got {kind!r:.40}.")
+    one_of(kind, ("SSM", "TSSM", "MSSM"), "kind")
     wide = as_number(0.0 if kind == "MSSM" else base_angle, "base_angle", least=0.0, below=third)
     narrow = platform_angle if kind == "SSM" else 0.0
     narrow = as_number(narrow, "platform_angle", least=0.0, below=third)

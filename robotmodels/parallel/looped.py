@@ -43,6 +43,7 @@ from scipy.spatial.transform import Rotation
 
 from .. import loops, se3
 from .._arrays import Array, Value, as_core, as_exact, batch_shape, read_only
+from .._choices import as_instance
 from ..errors import InvalidValueError, LoopError
 from ..kinematics import dgm, jacobian, jacobian_rate
 from ..kinematics.lengths import characteristic_length
@@ -250,11 +251,7 @@ def from_loops(
     looped_robot: loops.LoopedRobot, platform_frame: str | int, q_home: ArrayLike | None = None
 ) -> LoopedPlatform:
     """Parallel robot of any kind from a robot with kinematic loops."""
-    if not isinstance(looped_robot, loops.LoopedRobot):
-        raise InvalidValueError(
-            f"looped_robot: expected a loops.LoopedRobot, got {type(looped_robot).__name__}."
-        )
-    n = looped_robot.n
+    n = as_instance(looped_robot, loops.LoopedRobot, "looped_robot").n
     start = np.zeros(n) if q_home is None else as_exact(q_home, (n,), "q_home")
     found = loops.close(looped_robot, start[looped_robot.actuated], start)
     if not found.residual < 1e-8:

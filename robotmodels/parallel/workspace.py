@@ -45,7 +45,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, as_core, as_floats, as_number, read_only
+from .._arrays import Array, as_core, as_count, as_floats, as_number, read_only
+from .._choices import one_of
 from ..errors import InvalidValueError, ShapeError
 from ..obstacles.shapes import nearest_points
 from ..performance import Workspace, WorkspaceStatus
@@ -71,14 +72,6 @@ class PlatformWorkspace(Workspace):
     leg_radius: float | None
 
     @property
-    def poses(self) -> Array:
-        """World poses of the cells in the (first) orientation, shape (N, 4, 4)."""
-        T = np.tile(np.eye(4), (len(self.points), 1, 1))
-        T[:, :3, :3] = self.rotations[0]
-        T[:, :3, 3] = _world(self.points, self.frame)
-        return T
-
-    @property
     def area(self) -> float:
         """Area that is reached, m^2; NaN in space."""
         return measure(self.margin.reshape(self.shape), self.size, 2)
@@ -91,7 +84,7 @@ class PlatformWorkspace(Workspace):
     def contains(self, points: ArrayLike) -> Any:
         """Whether points (..., 2 or 3) are reached, computed exactly; shape (...)."""
         given = as_core(points, (len(self.size),), "points")
-        rows = _world(given.reshape(-1, given.shape[-1]), self.frame)
+        rows = self.cells.world(given.reshape(-1, given.shape[-1]))
         options = self.rotations, self.lower, self.upper, self.joint_cone, self.leg_radius
         robot: Any = self.model
         return (_margins(robot, self.kind, rows, options)[0] >= 0.0).reshape(given.shape[:-1])
@@ -115,8 +108,7 @@ def workspace(
     """Workspace of a platform: positions reached in one, every, or some orientation."""
     if is_looped(robot):
         raise InvalidValueError("robot: workspaces of kinematic loops are not computed.")
-    if kind not in KINDS:
-        raise InvalidValueError(f"kind: expected one of {', '.join(KINDS)}, got {kind!r:.40}.")
+    one_of(kind, KINDS, "kind")
     R, (low, high) = _rotations(robot, kind, orientation), _limits(robot, limits)
     bounds = [
         None if x is None else as_number(x, n, above=0.0)
@@ -124,12 +116,10 @@ def workspace(
     ]
     d = 2 if 2 not in robot.columns or height is not None else 3
     frame = np.eye(4)
-    frame[2, 3] = robot.home[2, 3] if height is None else as_number(height, "height")
-    n = as_number({2: 300, 3: 40}[d] if resolution is None else resolution, "resolution")
-    if n != int(n) or n < 2 or n**d > _MOST:
-        raise InvalidValueError(
-            f"resolution: expected a number to {_MOST ** (1 / d):.0f}, got {resolution!r:.20}."
-        )
+    if d == 2:
+        frame[2, 3] = robot.home[2, 3] if height is None else as_number(height, "height")
+    cells = {2: 300, 3: 40}[d] if resolution is None else resolution
+    n = as_count(cells, "resolution", 2, int(_MOST ** (1 / d)))
     # the boxes about spheres of the legs' longest reach
     reach = robot.crank + robot.rod if robot.has_cranks else high
     if not np.isfinite(reach).all():
@@ -146,12 +136,13 @@ def workspace(
     axes = 0.5 * (first + last)[:d] + np.outer(np.arange(n) - 0.5 * (n - 1), size)
     points = np.stack(np.meshgrid(*axes.T, indexing="ij"), axis=-1).reshape(-1, d)
     options = (read_only(R), low, high, *bounds)
-    margin, count = _margins(robot, kind, _world(points, frame), options)
+    places = points @ frame[:3, :d].T + frame[:3, 3]
+    margin, count = _margins(robot, kind, places, options)
     status = WorkspaceStatus.COUNTED if len(R) == 1 else WorkspaceStatus.SAMPLED
     status = status if count.any() else WorkspaceStatus.EMPTY
     model: Any = robot
     return PlatformWorkspace(
-        model, kind, limits is not False, None, None, R[0], points, count, size, (int(n),) * d,
+        model, kind, limits is not False, None, None, R[0], points, count, size, (n,) * d,
         "plane" if d == 2 else "space", frame, status, margin, *options,
     )  # fmt: skip
 
@@ -171,13 +162,6 @@ def measure(f: Array, size: Array, dimension: int) -> float:
         share += np.sign(np.prod(corner)) * top**2 * top ** (d - 2)  # quicker than a cube
     share /= factorial(d) * rise.prod(axis=0)
     return float(share.sum() * np.prod(size))
-
-
-def _world(points: Array, frame: Array) -> Array:
-    """World positions of points in a section or in space."""
-    if points.shape[-1] == 3:
-        return points
-    return np.pad(points, ((0, 0), (0, 1)), constant_values=frame[2, 3])
 
 
 def _rotations(robot: ParallelRobot, kind: str, orientation: Any) -> Array:

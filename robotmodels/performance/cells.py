@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_mask
+from .._arrays import Array, as_count, as_mask
 from .._arrays.tasks import Workers
 from ..errors import InvalidValueError
 from ..geometry import REVOLUTE
@@ -144,38 +144,23 @@ def space_of(
             "does not turn freely, or obstacles or an orientation are not symmetric about its "
             "axis; use section='space'."
         )
-    if circle and turned and section != "space":
-        arm = arms.section_arm(model)
-        if arm is not None:
-            return Space("half plane", arm.frame)
-        return Space("half plane", arms.axis_frames(model.base @ chain.D[0], radial=True)[1])
-    return Space("space", np.eye(4))
+    if not (circle and turned) or section == "space":
+        return Space("space", np.eye(4))
+    arm = arms.section_arm(model)
+    frame = arms.axis_frames(model.base @ chain.D[0], True)[1] if arm is None else arm.frame
+    return Space("half plane", frame)
 
 
-def checked_resolution(value: Any, default: int, dimensions: int, least: int = 2) -> int:
+def checked_resolution(value: Any, default: int, dimensions: int) -> int:
     """Cells along each axis, whose grid fits into 1 GB."""
-    if value is None:
-        return default
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-        raise InvalidValueError(
-            f"resolution: expected the number of cells along each axis, a whole number of at "
-            f"least {least}, got {value!r:.60}."
-        )
     most = int((_MOST_BYTES / _CELL_BYTES) ** (1.0 / max(dimensions, 1)))
-    if value > most:
-        raise InvalidValueError(
-            f"resolution: {value!r:.20} cells along each of {dimensions} axes do not fit into "
-            f"1 GB; at most {most} do."
-        )
-    return int(value)
+    return default if value is None else as_count(value, "resolution", 2, most)
 
 
 def cells_of(joints: JointSpace, space: Space, resolution: int | None, default: int) -> Cells:
     """Cells over the reach of an arm."""
-    count, arm = (
-        checked_resolution(resolution, default, space.dimensions),
-        arms.section_arm(joints.model),
-    )
+    count = checked_resolution(resolution, default, space.dimensions)
+    arm = arms.section_arm(joints.model)
     if arm is not None and space.is_section(arm):
         last = arm.columns[1:]
         axes = [np.linspace(low, high, _GRID) for low, high in joints.ranges(last)[0][last]]

@@ -45,10 +45,9 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array
+from .._arrays import Array, as_count
 from .._arrays.tasks import Progress, Workers
 from .._outcomes import Outcome, Result
-from ..errors import InvalidValueError
 from ..igm import igm
 from ..kinematics import dgm
 from ..kinematics.lengths import spread_configurations
@@ -112,8 +111,7 @@ def cuspidality(
 ) -> Cuspidality:
     """Cuspidality: whether an arm can change its posture without meeting a singular position."""
     check_model(arm)
-    if isinstance(poses, bool) or not isinstance(poses, (int, np.integer)) or poses < 1:
-        raise InvalidValueError(f"poses: expected a number of poses of at least 1, got {poses!r}.")
+    poses = as_count(poses, "poses")
     rng, work = generator_of(0 if rng is None else rng), Workers(executor, progress)
     section = section_arm(arm)
     cusped = section is not None and len(cusps_of(section, lines_of(arm, False)[0])[0]) > 0
@@ -126,7 +124,7 @@ def cuspidality(
     if section is not None and not cusped:
         apart = _all_apart(arm, section)
         return _result(arm, CuspidalityStatus.NOT_CUSPIDAL if apart else _NONE)
-    found = _by_search(arm, factors, rng, int(poses), work)
+    found = _by_search(arm, factors, rng, poses, work)
     for path in _level_paths(arm, section) if section is not None and found.status == _NONE else ():
         margin = _certified_margin(arm, factors, path)
         if margin > 0.0:
@@ -168,9 +166,8 @@ def _closed(arm: RobotModel, section: SectionArm, x: Array) -> list[Array]:
     column, first = int(section.columns[0]), dgm(arm, q[0])[:3, 3]
     if section.radial:
         # the first joint turns the last point to the first one along the way
-        ends = (np.array((first, dgm(arm, q[-1])[:3, 3])) - section.frame[:3, 3]) @ section.frame[
-            :3, :3
-        ]
+        ends = np.array((first, dgm(arm, q[-1])[:3, 3])) - section.frame[:3, 3]
+        ends = ends @ section.frame[:3, :3]
         turn = np.diff(np.arctan2(ends[:, 2], ends[:, 0]))[0]
         turn = (turn + np.pi) % (2.0 * np.pi) - np.pi
         q[:, column] = np.linspace(0.0, turn if section.local[0, 2, 2] > 0.0 else -turn, len(q))
@@ -263,18 +260,15 @@ def _by_search(
 
 def _signs_are_labels(factors: Factors, q: Array, labels: NDArray[np.str_]) -> bool:
     """Whether each word of the labels is the sign of a factor, the same way in all postures."""
-    words = [str(label).split() for label in labels]
-    if len(words) < _POSTURES or not all(words) or len({len(w) for w in words}) != 1:
+    ends = [[word[-1] for word in str(label).split()] for label in labels]
+    if len(ends) < _POSTURES or len({*map(len, ends)}) != 1 or not {"+", "-"}.issuperset(*ends):
         return False
-    count = len(words[0])
-    if any(word[-1] not in "+-" for row in words for word in row):
-        return False
-    signs = np.array([[1 if word[-1] == "+" else -1 for word in row] for row in words])
+    signs = np.where(np.array(ends) == "+", 1, -1)
     own = np.where(factors.values(q) > 0.0, 1, -1)
     # a label that is the same in all postures tells nothing and needs no factor
-    told = [c for c in range(count) if np.ptp(signs[:, c])]
-    products = signs[:, told].T @ own / max(len(own), 1)
-    return bool((np.abs(products).max(axis=1, initial=0.0) == 1.0).all()) and bool(told)
+    told = np.ptp(signs, axis=0) > 0
+    products = signs[:, told].T @ own / len(own)
+    return bool((np.abs(products).max(axis=1, initial=0.0) == 1.0).all()) and bool(told.any())
 
 
 def _most_regular(

@@ -56,7 +56,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, Frozen, Value, as_mask, as_vector
 from .._arrays.tasks import Progress, Workers
-from .._choices import one_of
+from .._choices import as_instance, one_of
 from ..errors import InvalidValueError
 from ..kinematics import jacobian
 from ..kinematics.lengths import length_of
@@ -204,8 +204,7 @@ def workspace_of(arm: RobotModel, over: Any) -> Workspace:
     """The given workspace: that of the positions without one."""
     if over is None:
         return workspace(arm)
-    if not isinstance(over, Workspace):
-        raise InvalidValueError(f"over: expected a Workspace, got {type(over).__name__}.")
+    over = as_instance(over, Workspace, "over")
     if over.model is not arm and over.model != arm:
         raise InvalidValueError(
             f"over: expected a workspace of {arm.name}, got one of {over.model.name}."

@@ -45,7 +45,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_mask
 from .._choices import one_of
 from .._outcomes import Outcome, Result
-from ..errors import InvalidValueError, ShapeError
+from ..errors import ShapeError
 from ..igm.loop import joint_chain
 from ..igm.request import poses_of
 from ..kinematics import dgm, jacobian
@@ -117,10 +117,6 @@ def feasible_path(
     """Follow a path of poses from every posture of its first pose."""
     joints = joint_space(arm, limits)
     one_of(cost, COSTS, "cost")
-    if not isinstance(through_singular, (bool, np.bool_)):
-        raise InvalidValueError(
-            f"through_singular: expected True or False, got {through_singular!r:.60}."
-        )
     T = poses_of(poses)
     if T.ndim != 3:
         raise ShapeError(f"poses: expected shape (N, 4, 4), got {T.shape}.")

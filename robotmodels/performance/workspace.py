@@ -43,7 +43,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_exact, as_mask, as_reals
+from .._arrays import Array, as_exact, as_floats, as_mask
 from .._arrays.tasks import Progress, Workers
 from .._choices import one_of
 from .._outcomes import Outcome, Result
@@ -115,8 +115,9 @@ class Workspace(Result):
     @property
     def poses(self) -> Array:
         """World poses (N, 4, 4) of the cells, in the requested orientation or that of q = 0."""
-        home = dgm(self.model, np.zeros(self.model.n))[:3, :3]
-        return self.cells.poses(home if self.rotation is None else self.rotation)
+        if self.rotation is None:
+            return self.cells.poses(dgm(self.model, np.zeros(self.model.n))[:3, :3])
+        return self.cells.poses(self.rotation)
 
     @property
     def place(self) -> Flags | None:
@@ -165,25 +166,28 @@ class Workspace(Result):
     def contains(self, points: ArrayLike) -> Flags:
         """Whether points (..., 2 or 3), in coordinates of ``points`` or the world, are reached.
 
-        Solved exactly where the postures of an arm are counted; else that of the cell.
+        Solved exactly where the postures of an arm are counted; else that of the cell. World points
+        off the plane in which an arm moves are not.
         """
-        given = as_reals(points, "points")
+        given = as_floats(points, "points")
         if given.ndim == 0 or given.shape[-1] not in (2, 3) or given.shape[-1] < len(self.size):
             wanted = "(..., 3) in the world"
             wanted = wanted if len(self.size) == 3 else f"(..., 2) in the section or {wanted}"
             raise ShapeError(f"points: expected shape {wanted}, got {given.shape}.")
         rows, cells = given.reshape(-1, given.shape[-1]), self.cells
-        inside = np.asarray(np.isfinite(rows).all(axis=1))
-        rows = np.where(inside[:, None], rows, 0.0)
         local = rows if rows.shape[1] == len(self.size) else cells.of_world(rows)
         if self.kind in ("positions", "free") and _is_counted(cells, self.model):
-            in_world = rows.shape[1] == 3 and self.coordinates == "plane"
-            world = rows if in_world else cells.world(local)
-            inside &= _count_positions(self.joints, world, Workers()) > 0
+            inside = _count_positions(self.joints, cells.world(local), Workers()) > 0
         else:
-            number, known = cells.numbers(local)
-            inside &= known
-            inside[known] &= self.count[number] > 0
+            number, inside = cells.numbers(local)
+            inside[inside] = self.count[number] > 0
+        if (
+            local is not rows
+            and self.coordinates == "plane"
+            and arms.plane_normal(self.model) is not None
+        ):
+            height = (rows - self.frame[:3, 3]) @ self.frame[:3, 2]
+            inside &= np.abs(height) <= 1e-9 * (1.0 + np.abs(rows).max(axis=1))
         return inside.reshape(given.shape[:-1])
 
     def boundary(self) -> list[Array]:
@@ -248,6 +252,11 @@ def workspace(
     one_of(kind, KINDS, "kind")
     one_of(section, SECTIONS, "section")
     rows = None if mask is None else as_mask(mask)
+    if rows is not None and rows[3:].any() and kind in ("positions", "free"):
+        raise InvalidValueError(
+            f"mask: kind={kind!r} counts positions in any orientation; leave it out, or "
+            "take kind='orientation' or 'primary'."
+        )
     rotation = _rotation(kind, orientation, free)
     space = space_of(joints, section, free is None and kind != "orientation", mask)
     asked = arm, kind, joints.limits, joints.free, rows, rotation

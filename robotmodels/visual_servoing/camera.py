@@ -40,10 +40,10 @@ class Camera(Value):
         focal = np.broadcast_to(focal, (2,)) if focal.ndim == 0 else focal
         for name, value in (("focal", focal), ("centre", self.centre), ("size", self.size)):
             object.__setattr__(self, name, read_only(as_exact(value, (2,), name)))
-        if not self.focal.all():
-            raise InvalidValueError(f"focal: expected pixels, not zero, got {self.focal}.")
-        if not (self.size > 0.0).all():
-            raise InvalidValueError(f"size: expected pixels above zero, got {self.size}.")
+        if not self.focal.all() or not (self.size > 0.0).all():
+            raise InvalidValueError(
+                f"focal, size: expected pixels, not zero, got {self.focal} and {self.size}."
+            )
 
     def normalise(self, pixels: ArrayLike) -> Array:
         """Normalised coordinates (..., 2) of pixels (..., 2)."""

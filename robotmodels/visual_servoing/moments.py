@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -69,11 +68,10 @@ class Moments(Feature):
             raise InvalidValueError("Moments: expected a polygon or points=, one of the two.")
         name, least = ("points", 2) if self.polygon is None else ("polygon", 3)
         corners = as_points(getattr(self, name), name, least)
-        words: Any = self.components
-        several = isinstance(words, Iterable) and not isinstance(words, str)
-        words = tuple(words) if several else (words,)
-        known = [name for name in words if isinstance(name, str) and name in _COMPONENTS]
-        if not words or len(set(known)) < len(words):
+        one = isinstance(self.components, str)
+        words = (self.components,) if one else tuple(self.components)
+        known = {*words} & {*_COMPONENTS}
+        if not words or len(known) < len(words):
             raise InvalidValueError(
                 f"components: expected some of {', '.join(_COMPONENTS)}, each once, got {words}."
             )
@@ -179,10 +177,8 @@ def _check_polygon(corners: Array) -> None:
     part = np.einsum("ejk,ek->ej", lever, along) / (along**2).sum(axis=1)[:, None]
     gap = np.linalg.norm(lever - np.clip(part, 0.0, 1.0)[..., None] * along[:, None], axis=2)
     gap[n, n] = gap[n, (n + 1) % len(p)] = np.inf
-    faults = np.argwhere((apart & apart.T) | (gap <= THIN * size))
-    if len(faults):
-        edge, other = faults[0]
+    if ((apart & apart.T) | (gap <= THIN * size)).any():
         raise InvalidValueError(
-            f"polygon: the edge from corner {edge} crosses or touches that from corner {other}; "
-            "expected an outline that does not touch itself, its corners in order."
+            "polygon: edges cross or touch each other; expected an outline that does not touch "
+            "itself, its corners in order."
         )

@@ -47,9 +47,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from .._arrays import Array
+from .._arrays import Array, batch_shape
 from .._outcomes import Outcome, Result
-from ..errors import InvalidValueError, ShapeError
+from ..errors import InvalidValueError
 from ..se3 import as_single_pose
 from .features import Points, placed, sight_of
 from .results import as_points, as_sized, packed, taken
@@ -98,12 +98,7 @@ class PoseSolutions(Result):
 def p3p(points: ArrayLike, image: ArrayLike) -> PoseSolutions:
     """Poses of three points, at most four."""
     P, m = as_sized(points, (3, 3), "points"), _as_image(image, 3)
-    try:
-        batch = np.broadcast_shapes(P.shape[:-2], m.shape[:-2])
-    except ValueError:
-        raise ShapeError(
-            f"points, image: the leading axes of {P.shape} and {m.shape} do not fit each other."
-        ) from None
+    batch = batch_shape((P[..., 0], m[..., 0]), ("points", "image"))
     P = np.broadcast_to(P, (*batch, 3, 3)).reshape(-1, 3, 3)
     m = np.broadcast_to(m, (*batch, 3, 2)).reshape(-1, 3, 2)
     flat = _sine(P) <= _THIN

@@ -91,12 +91,6 @@ def _unit(value: Any, name: str) -> Array:
     return array if abs(length - 1.0) < 4e-16 else array / length
 
 
-def _flag(value: Any, name: str) -> bool:
-    if not isinstance(value, bool | np.bool_):
-        raise InvalidValueError(f"{name}: expected True or False, got {value!r:.40}.")
-    return bool(value)
-
-
 def _positive(value: Any, name: str) -> float:
     return as_number(value, name, above=0.0, below=LARGEST)
 
@@ -117,5 +111,5 @@ _CHECKS: dict[str, Callable[[Any, str], Any]] = {
     "object_points": as_points,
     "points": _pairs,
     "depth": _depth,
-    "kalman": _flag,
+    "kalman": lambda value, name: bool(value),
 }

@@ -71,6 +71,7 @@ from .tasks import Hybrid, TargetMotion, Task
 from .velocity import ServoStatus, check_kinds, law, moved
 
 _MOST = 1_000_000  # steps of a simulation
+_MET = 1e-6  # error that counts as none
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -111,19 +112,18 @@ class ServoMotion(Result):
 
     @property
     def status(self) -> ServoStatus:
-        """Outcome at the end."""
-        return ServoStatus(int(self.codes[-1]))
+        """Outcome at the end; STEADY_ERROR if an error stays although the law gives velocities."""
+        size, middle = np.linalg.norm(self.error, axis=1), len(self.t) // 2
+        rate = 0.1 * self.task.regulated.gain  # the law would reduce the error ten times as fast
+        least = size[middle] * np.exp(-rate * (self.t[-1] - self.t[middle]))
+        stays = size[-1] > max(_MET, least) and self.codes[-1] == ServoStatus.CONVERGES
+        return ServoStatus.STEADY_ERROR if stays else ServoStatus(int(self.codes[-1]))
 
-    def reason(self) -> str:
+    def reason(self, i: Any = ()) -> str:
         """Sentence of the status, with the errors at both ends."""
-        followed = "The law was followed to the end: no proof of convergence."
-        outcome = self.status
-        sentence = followed if outcome is ServoStatus.CONVERGES else outcome.sentence
         first, last = np.abs(self.error[[0, -1]]).max(axis=1)
-        return f"{sentence} Largest error {first:.3g} at the start, {last:.3g} at the end."
-
-    def __repr__(self) -> str:
-        return f"<ServoMotion: {len(self.t)} samples to {self.t[-1]:g} s. {self.reason()}>"
+        words = f"Largest error {first:.3g} at the start, {last:.3g} at the end."
+        return f"{self.status.sentence} {words}"
 
 
 def servo(

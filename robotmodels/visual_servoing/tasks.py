@@ -62,6 +62,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, Frozen, Value, as_exact, as_floats, as_number
+from .._choices import as_instance
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_pose, as_single_pose
 from .features import Feature, Sight, as_sensed
@@ -86,16 +87,7 @@ class Task(Checked):
 
     def __post_init__(self) -> None:
         self._check("gain", "interaction", "depth")
-        feature: Any = self.feature
-        if not isinstance(feature, Feature):
-            raise InvalidValueError(
-                f"feature: expected one such as Points(...), got {type(feature).__name__}."
-            )
-        if isinstance(self.desired, Feature | Task):
-            raise InvalidValueError(
-                f"desired: expected the measurement ({feature.size},) of {type(feature).__name__} "
-                f"or a pose (4, 4), got {type(self.desired).__name__}; give its measure(T)."
-            )
+        feature: Any = as_instance(self.feature, Feature, "feature", " such as Points(...)")
         s, is_pose = as_sensed(self.desired, feature, "desired")
         T, w, L = None, None, None
         if is_pose:
@@ -161,9 +153,7 @@ class Hybrid(Checked):
 
     def __post_init__(self) -> None:
         self._check("weight")
-        if not isinstance(self.primary, Task):
-            got = type(self.primary).__name__
-            raise InvalidValueError(f"primary: expected a Task, got {got}.")
+        as_instance(self.primary, Task, "primary")
         if not isinstance(self.secondary, Task | Callable):
             self._set("secondary", as_exact(self.secondary, (6,), "secondary"))
 
@@ -211,10 +201,7 @@ class TargetMotion(Checked):
         self, last: TargetEstimate, s: ArrayLike, own: ArrayLike, step: float
     ) -> TargetEstimate:
         """Estimate with the next measurement s (k,); ``own`` (k,) is the rate by the camera."""
-        if not isinstance(last, TargetEstimate):
-            raise InvalidValueError(
-                f"last: expected the estimate of start or update, got {type(last).__name__}."
-            )
+        as_instance(last, TargetEstimate, "last", " of start or update")
         s, own = (as_exact(x, last.s.shape, name) for x, name in ((s, "s"), (own, "own")))
         h = as_number(step, "step", above=0.0)
         seen = (s - last.s) / h - own

@@ -44,6 +44,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from .._arrays import LARGEST, Array, Frozen, Value, as_exact, read_only
+from .._choices import as_instance
 from .._outcomes import Outcome, Result
 from ..errors import InvalidValueError
 from .camera import Camera
@@ -70,6 +71,7 @@ class ServoStatus(Outcome):
     OUT_OF_SIGHT = 3, "A part of the object is outside the image."
     BEHIND = 4, "A part of the object is not in front of the camera, or is seen edge-on."
     LIMITED = 5, "The robot cannot follow: limits of joints, a singular posture, too few joints."
+    STEADY_ERROR = 6, "The law gives velocities, yet an error stays: noise, or a moving target."
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -112,11 +114,10 @@ def camera_velocity(
 
 def check_kinds(task: Any, **given: tuple[Any, type]) -> None:
     """Raise for anything but a task, and for options of another kind."""
-    if not isinstance(task, Task | Hybrid):
-        raise InvalidValueError(f"task: expected a Task or Hybrid, got {type(task).__name__}.")
+    as_instance(getattr(task, "regulated", task), Task, "task")
     for name, (value, kind) in given.items():
-        if value is not None and not isinstance(value, kind):
-            raise InvalidValueError(f"{name}: expected {kind.__name__}, got {value!r:.60}.")
+        if value is not None:
+            as_instance(value, kind, name)
 
 
 def law(
@@ -233,9 +234,7 @@ class VirtualLink(Frozen, Value):
 
 def virtual_link(f: Feature, T: ArrayLike) -> VirtualLink:
     """Virtual link between a camera and an object: the kernel of the interaction matrix."""
-    if not isinstance(f, Feature):
-        raise InvalidValueError(f"f: expected a feature, got {type(f).__name__}.")
-    _, sizes, Vt = np.linalg.svd(f.interaction(T))
+    _, sizes, Vt = np.linalg.svd(as_instance(f, Feature, "f").interaction(T))
     rank = (sizes > RANK_TOLERANCE * sizes[..., :1]).sum(axis=-1)
     free, motions = np.arange(6) >= rank[..., None], 6 - rank
     turns = np.where(free[..., None], Vt[..., 3:], 0.0)
