@@ -319,15 +319,6 @@ def test_adaptive_control_learns_what_the_motion_excites():
     assert "excites these parameters too little to estimate: ZZ1" in run.reason()
 
 
-def test_standard_parameters_and_drives_are_learnt_too():
-    rail = slider(2.0, Fv=[1.5], Ia=[0.5], Fc=[0.3])
-    goal = quintic([0.0], [1.0], duration=1.0)
-    known = control.AdaptiveSlotineLi(goal, 5.0, 20.0, 5.0, start=[2.5, 1.5, 0.3], model=rail,
-                                      drive=("Ia", "Fv", "Fc"))  # fmt: skip
-    assert known.true_values(rail).tolist() == [2.5, 1.5, 0.3]
-    assert np.abs(control.run(rail, known, [0.0], t=np.linspace(0, 1, 11)).error).max() < 1e-8
-
-
 # --- contact -----------------------------------------------------------------------------------
 
 

@@ -472,20 +472,6 @@ def test_actuated_joints_that_do_not_determine_the_others(rng):
     assert loops.LoopedRobot(passive, robot.closures).actuated.tolist() == [1]
 
 
-def test_a_tree_is_a_robot_without_closures(rng):
-    tree = FLEET[0][0].tree
-    robot = loops.LoopedRobot(tree, [], [0, 1, 2])
-    q, v, a = rng.normal(size=(3, 4, 3))
-    assert (loops.close(robot, q).q == q).all()
-    assert np.array_equal(loops.mobility(robot, q), [3] * 4)
-    assert loops.mobility(robot, q).redundant == ()
-    assert np.allclose(loops.velocity_map(robot, q), np.eye(3))
-    tau = loops.idm(robot, q, v, a)
-    assert np.allclose(tau, rm.idm(tree, q, v, a))
-    assert np.allclose(loops.ddm(robot, q, v, tau), a)
-    assert len(loops.base_parameters(robot)) == len(rm.base_parameters(tree))
-
-
 def test_a_four_bar_follows_freudenstein(rng):
     a, c, d = 0.3, 0.7, 1.0
     robot = four_bar(rng, crank=a, coupler=0.9, rocker=c, ground=d)

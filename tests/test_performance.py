@@ -176,7 +176,8 @@ def test_annulus():
     loops = w.boundary()
     assert sum(map(shoelace, loops)) == pytest.approx(w.area, rel=1e-6)
     np.testing.assert_array_equal(w.contains([[1, 1], [1.7, 0], [0.1, 0]]), [True, False, False])
-    np.testing.assert_array_equal(w.contains([[[1, 1, 0], [0, 0, 3]]]), [[True, False]])
+    points = [[[1, 1, 0], [0, 0, 3], [1, 1, 1e-3]]]  # the last off the plane
+    np.testing.assert_array_equal(w.contains(points), [[True, False, False]])
 
 
 @pytest.mark.parametrize(
@@ -303,7 +304,7 @@ def test_accessibility_says_why():
 def test_redundant_arms_reach_what_they_reach_within_their_limits(rng):
     lower, upper = [-0.5, 0.3, -1.5, 0.2], [1.5, 2.0, -0.2, 1.0]
     arm = planar(0.5, 0.4, 0.4, 0.3, lower=lower, upper=upper)
-    T = rm.dgm(arm, rng.uniform(lower, upper, (60, 4)))
+    T = rm.dgm(arm, rng.uniform(lower, upper, (25, 4)))
     for mask in (PLANE, [1, 1, 0, 0, 0, 1]):
         found = pf.accessibility(arm, T, mask=mask)
         assert not found.status.any()
@@ -320,6 +321,12 @@ def test_accessible_poses_and_orientations():
     found = pf.accessibility(arm, places, "every_orientation", limits=False)
     assert found.status.tolist() == [0, 4, 1]
     assert found.count[0] > 0
+    scara, mask = rm.load("cobra_s600"), [1, 1, 1, 0, 0, 1]
+    w = pf.workspace(scara, "primary", mask=mask, limits=False, resolution=10)
+    assert w.count.max() == 2  # in every orientation about one axis
+    w = pf.workspace(WENGER, mask=PLANE, limits=False, resolution=40)
+    assert w.coordinates == "plane"
+    assert w.contains(w.points).sum() == (w.count > 0).sum()
 
 
 # --- aspects -------------------------------------------------------------------------------------
@@ -403,24 +410,6 @@ def test_an_orthogonal_arm_is_cuspidal_if_and_only_if_it_has_cusps(arms):
             found = pf.cuspidality(three(*p))
             assert (*p, found.status.name) == (*p, "CUSPIDAL" if count else "NOT_CUSPIDAL")
             assert count == 0 or proof_holds(three(*p), found, slice(0, 3))
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("sigma", [(0, 0, 1), (0, 1, 0), (1, 0, 0), (0, 0, 1, 0, 0, 0)])
-def test_changes_of_posture_keep_the_limits_of_slides(sigma):
-    rng, n, slides = np.random.default_rng(0), len(sigma), np.array(sigma) == 1
-    ends = np.where(slides, 0.15, np.pi)
-    for _ in range(3):
-        table = DHTable(
-            antecedent=range(n), sigma=sigma, alpha=[0, *rng.uniform(-1.6, 1.6, n - 1)],
-            d=[0, *rng.uniform(0.1, 1.0, n - 1)], lower=-ends, upper=ends,
-            theta=np.where(slides, rng.uniform(-3, 3, n), 0.0),
-        )  # fmt: skip
-        arm = rm.RobotModel.from_table(table, tool=translation(0.8, 0.1, 0.0))
-        found = pf.cuspidality(arm, poses=10)
-        assert (np.abs(found.path[:, slides]) <= 0.15 + 1e-8).all()
-        if found.status == pf.CuspidalityStatus.CUSPIDAL:
-            np.testing.assert_allclose(*rm.dgm(arm, found.ends)[:, :3, 3], atol=1e-9)
 
 
 def test_least_singular_values_have_a_lipschitz_bound_that_proves_paths(rng):
@@ -508,6 +497,8 @@ def test_every_path_in_a_t_region_is_followed(arm, free):
         (lambda: pf.workspace("puma560"), InvalidValueError, "load it first"),
         (lambda: pf.workspace(TWO, resolution=10**6), InvalidValueError, "at most"),
         (lambda: pf.workspace(TWO, "free"), InvalidValueError, "obstacles"),
+        (lambda: pf.workspace(TWO, mask=[1, 1, 0, 0, 0, 1]), InvalidValueError, "orientation"),
+        (lambda: pf.workspace(TWO, resolution=6).contains([np.nan, 0]), InvalidValueError, "NaN"),
         (lambda: pf.workspace(TWO, free=lambda q: 1), ShapeError, "bool"),
         (lambda: pf.workspace(rm.load("gantry").with_table(
             replace(rm.load("gantry").table, lower=[-np.inf] * 6, upper=[np.inf] * 6)
@@ -557,36 +548,15 @@ def test_results_are_values_and_caches_keep_no_model():
     assert gone() is None
 
 
-def test_a_plane_that_is_not_the_section_has_its_own_grid():
-    w = pf.workspace(WENGER, mask=PLANE, limits=False, resolution=40)
-    assert w.coordinates == "plane"
-    assert w.points.min() < -4.0  # a disc about the first axis, not half a plane
-    reach = pf.workspace(WENGER, limits=False, resolution=40).points[:, 0].max()
-    assert w.area == pytest.approx(w.grid_area)
-    assert w.contains(w.points).sum() == (w.count > 0).sum()
-    assert w.area == pytest.approx(np.pi * reach**2, rel=0.2)
-
-
 def test_components_that_leave_a_family():
     poses = [translation(0.1, 0, 0), translation(0.1, 1, 0)]
     found = pf.accessibility(TWO, poses, mask=[1, 0, 0, 0, 0, 0])
     assert (found.status == pf.AccessStatus.ACCESSIBLE).all()
-    found = pf.feasible_path(WENGER, poses, mask=[1, 0, 0, 0, 0, 0])
-    assert found.status is pf.PathStatus.NOT_DEFINED
     tilted = rm.RobotModel.from_table(
         DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 1], alpha=[0.5, 0]),
         tool=translation(0.5, 0, 0),
     )
     assert pf.accessibility(tilted, rm.dgm(tilted, [0.3, 0.7]), mask=PLANE).count == 2
-
-
-def test_every_orientation_about_one_axis():
-    scara = rm.load("cobra_s600")
-    T = rm.dgm(scara, [[0.3, 0.5, 0.05, 0.2]])
-    mask = [1, 1, 1, 0, 0, 1]
-    assert pf.accessibility(scara, T, "every_orientation", limits=False, mask=mask).count == 2
-    w = pf.workspace(scara, "primary", mask=mask, limits=False, resolution=10)
-    assert w.count.max() == 2
 
 
 # --- long calls ----------------------------------------------------------------------------------

@@ -256,6 +256,7 @@ def test_moving_targets_are_tracked():
     options = {"duration": 10.0, "step": 0.05, "target": twist}
     lag = vs.servo(task, START, **options)
     assert abs(lag.error[-1]).max() > 0.02
+    assert lag.status is S.STEADY_ERROR
     for tracker in (vs.TargetMotion(kalman=False), vs.TargetMotion()):
         assert abs(vs.servo(task, START, tracking=tracker, **options).error[-1]).max() < 1e-4
     noisy = [
@@ -265,8 +266,6 @@ def test_moving_targets_are_tracked():
     ]  # fmt: skip
     shake = [np.std(run.velocity[100:], axis=0).max() for run in noisy]
     assert shake[0] < 0.5 * shake[1]  # the filter pays
-    moving = vs.servo(task, START, target=lambda t: 0.1 * np.sin(t) * np.eye(6)[0], duration=2.0)
-    assert moving.status is S.CONVERGES
 
 
 def test_the_kalman_gain_is_the_known_one():

@@ -56,11 +56,7 @@ class TipStatus(Outcome):
     """Outcome of an inversion; fits int8."""
 
     FOUND = 0, "The torques move the tip along its reference."
-    NON_MINIMUM_PHASE = (
-        1,
-        "The tip is a non-minimum-phase output: causal torques would grow without bound; take "
-        "method='stable_inversion'.",
-    )
+    NON_MINIMUM_PHASE = 1, "The tip is non-minimum-phase: take method='stable_inversion'."
     NOT_FOUND = 2, "No bounded motion of the joints was found; take a slower reference."
 
 

@@ -10,8 +10,7 @@ Parameters
 robot, q
     See `robotmodels.parallel`.
 T0 : array_like, shape (..., 4, 4), optional
-    Where to start; default the home pose, of a Gough platform without limits raised to the mean of
-    the lengths.
+    Where to start; default the home pose.
 
 Returns
 -------
@@ -49,7 +48,6 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import LARGEST, Array, as_bounded, as_vector, batch_rows
 from .._outcomes import Outcome
 from ..errors import InvalidValueError
-from .families import height_above
 from .legs import Found, Robot, is_looped, leg_states, rods
 from .robot import Family, ParallelRobot, PlatformResult, pose_at
 
@@ -109,7 +107,7 @@ def dgm(robot: Robot, q: ArrayLike, T0: ArrayLike | None = None) -> PlatformPose
     if is_looped(robot):
         return PlatformPoses(*robot.closed(q, T0))
     q = checked_actuators(robot, q)
-    start = _start(robot, q) if T0 is None else robot.checked(T0, "T0")
+    start = robot.home if T0 is None else robot.checked(T0, "T0")
     batch, (rows, T0) = batch_rows((q, start.reshape(*start.shape[:-2], 16)), ("q", "T0"))
     T, out = np.empty((len(rows), 4, 4)), np.empty((len(rows), 4))
     from .kernels import direct
@@ -198,20 +196,6 @@ def checked_actuators(robot: ParallelRobot, q: ArrayLike) -> Array:
             f"q: expected lengths of legs (not strokes) that are not negative, got {least:.6g} m."
         )
     return q
-
-
-def _start(robot: ParallelRobot, q: Array) -> Array:
-    """Where Newton's method starts without a given pose. Shapes: (..., m) -> (..., 4, 4)."""
-    place = robot.base.mean(axis=0) - robot.platform.mean(axis=0)
-    up = robot.home[:3, 3] - place
-    turned = not np.allclose(robot.home[:3, :3], np.eye(3))
-    if robot.family is not Family.GOUGH or np.isfinite(robot.upper).all() or turned:
-        return robot.home
-    normal = up / np.linalg.norm(up) if up.any() else np.array([0.0, 0.0, 1.0])
-    start = np.broadcast_to(robot.home, (*q.shape[:-1], 4, 4)).copy()
-    height = height_above(robot, place, normal, (q**2).mean(axis=-1))
-    start[..., :3, 3] = place + height[..., None] * normal
-    return start
 
 
 # --- six legs: parameter homotopy from a stored robot, see `kernels_homotopy` ---------------------

@@ -89,11 +89,6 @@ class PlatformWorkspace(Workspace):
         robot: Any = self.model
         return (_margins(robot, self.kind, rows, options)[0] >= 0.0).reshape(given.shape[:-1])
 
-    def __repr__(self) -> str:
-        unit, value = ("m^2", self.area) if len(self.size) == 2 else ("m^3", self.volume)
-        cells = " x ".join(map(str, self.shape))
-        return f"<Workspace of {self.model!r}:\n  {self.kind}, {cells} cells, {value:.6g} {unit}>"
-
 
 def workspace(
     robot: ParallelRobot,

@@ -52,7 +52,6 @@ from .singularity import Factors, sign_factors
 _CELLS = {1: (4096, 4096), 2: (400, 1200), 3: (96, 160), 4: (28, 36), 5: (14, 14), 6: (9, 9)}
 _AT_A_TIME = 65536
 _SPECKS = 1e-4  # of all cells: components without a core that belong to another
-_FEW = 7
 
 
 class AspectStatus(Outcome):
@@ -151,13 +150,9 @@ class Aspects(Result):
         return out.reshape(given.shape[:-1])
 
     def __repr__(self) -> str:
-        shares = ", ".join(f"{v:.4g}" for v in self.volume[:_FEW])
-        more = ", ..." if self.count > _FEW else ""
-        kind = ("aspect" if self.names else "component") + "s" * (self.count != 1)
-        return (
-            f"<Aspects of {self.model.name}: {self.count} {kind}, volumes {shares or 'none'}{more};"
-            f"\n  {self.reason()}>"
-        )
+        kind = "aspects" if self.names else "components"
+        shares = np.array2string(self.volume[:8], precision=4)
+        return f"<Aspects of {self.model.name}: {self.count} {kind}, {shares}; {self.reason()}>"
 
 
 def aspects(
@@ -340,6 +335,5 @@ def _products(joints: JointSpace, names: tuple[str, ...], groups: tuple[Group, .
 
 
 def _none(joints: JointSpace, status: AspectStatus) -> Aspects:
-    none = np.zeros((0, 0), np.int64)
-    parts = (), none.astype(np.int8), np.zeros(0), (), none
+    parts = (), np.zeros((0, 0), np.int8), np.zeros(0), (), np.zeros((0, 0), np.int64)
     return Aspects(joints.model, joints.limits, joints.free, *parts, status)

@@ -58,10 +58,7 @@ class SectionStatus(Outcome):
 
     FOUND = 0, "All curves were found."
     INCOMPLETE = 1, "Singular curves touch or cross in joint space: cusps and nodes may be missing."
-    NOT_DEFINED = (
-        2, "The arm has no section: its position is not determined by three joints, or by two in "
-        "a plane.",
-    )  # fmt: skip
+    NOT_DEFINED = 2, "The position is not determined by three joints, or by two in a plane."
 
 
 class CurveKind(Enum):

@@ -72,13 +72,9 @@ class CuspidalityStatus(Outcome):
     """Outcome of `cuspidality`."""
 
     CUSPIDAL = 0, "A path between two postures of one pose was proved to meet no singular position."
-    NOT_CUSPIDAL = (
-        1, "The postures of a pose lie in different aspects: a change of posture is singular.",
-    )  # fmt: skip
+    NOT_CUSPIDAL = 1, "The postures of a pose lie in different aspects: changes are singular."
     NONE_FOUND = 2, "No change of posture without a singular position was found; this is no proof."
-    NOT_DEFINED = (
-        3, "The Jacobian of the task is not square, or never regular: postures are not isolated.",
-    )  # fmt: skip
+    NOT_DEFINED = 3, "The Jacobian of the task is not square, or never regular."
 
 
 _NONE = CuspidalityStatus.NONE_FOUND

@@ -66,10 +66,7 @@ class PathStatus(Outcome):
 
     FOLLOWED = 0, "The path is followed from at least one starting posture."
     BROKEN = 1, "The path is followed to its end from no starting posture."
-    NOT_DEFINED = (
-        2, "The task leaves infinitely many postures, or no joint moves the tool: lock a joint, or "
-        "request more components.",
-    )  # fmt: skip
+    NOT_DEFINED = 2, "The task leaves infinitely many postures, or none moves: lock a joint."
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -70,10 +70,7 @@ class RegionStatus(Outcome):
 
     FOUND = 0, "The workspace was divided."
     EMPTY = 1, "No cell is reached."
-    NOT_DEFINED = (
-        2, "Infinitely many postures reach a point: regions do not determine which path can be "
-        "followed.",
-    )  # fmt: skip
+    NOT_DEFINED = 2, "Infinitely many postures reach a point: regions do not determine paths."
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

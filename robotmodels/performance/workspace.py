@@ -66,15 +66,10 @@ class WorkspaceStatus(Outcome):
     """Meaning of the counts of a workspace."""
 
     COUNTED = 0, "The postures of every cell were counted."
-    REACHED_ONLY = (
-        1, "Infinitely many postures reach a cell: the count is 1 where one was found.",
-    )  # fmt: skip
+    REACHED_ONLY = 1, "Infinitely many postures reach a cell: 1 counts where one was found."
     SAMPLED = 2, "Orientations were sampled; the count is the least over the samples."
     EMPTY = 3, "No cell is reached."
-    NOT_DEFINED = (
-        4,
-        "The tool does not move, or only on a curve or a surface in space, without volume.",
-    )
+    NOT_DEFINED = 4, "The tool does not move, or only on a curve or a surface in space."
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -216,22 +211,17 @@ class Workspace(Result):
         if self.coordinates == ("space", "plane")[which]:
             return float("nan")
         if self._by_curves:
-            values = measures(self.model, self.limits)[which]
-            if count is None:
-                return float(values.sum())
-            return float(values[count]) if 0 <= count < len(values) else 0.0
-        chosen = self.count > 0 if count is None else self.count == count
-        if count == 0:
-            return 0.0
-        return float(self.cells.measures()[which][chosen].sum())
+            values, of = measures(self.model, self.limits)[which], np.arange(5)
+        else:
+            values, of = self.cells.measures()[which], self.count
+        return float(values[of > 0 if count is None else (of == count) & (of > 0)].sum())
 
     def __repr__(self) -> str:
-        unit, value = ("m^3", self.volume) if self.coordinates != "plane" else ("m^2", self.area)
-        most = int(self.count.max(initial=0))
-        grid = " x ".join(map(str, self.shape))
+        unit, value = ("m^2", self.area) if self.coordinates == "plane" else ("m^3", self.volume)
+        grid, of = " x ".join(map(str, self.shape)), getattr(self.model, "name", self.model)
         return (
-            f"<Workspace of {self.model.name}: {self.kind}, {self.coordinates}, {grid} cells\n"
-            f"  {value:.6g} {unit}, at most {most} postures\n  {self.reason()}>"
+            f"<Workspace of {of}: {self.kind}, {self.coordinates}, {grid} cells, {value:.6g} "
+            f"{unit}, at most {self.count.max(initial=0)} postures. {self.reason()}>"
         )
 
 
@@ -296,19 +286,12 @@ def workspace(
     return _workspace(asked, cells, count, status)
 
 
-def _workspace(
-    asked: tuple[RobotModel, str, bool, Any, Any, Any],
-    cells: Cells,
-    count: Any,
-    status: WorkspaceStatus,
-) -> Workspace:
+def _workspace(asked: Any, cells: Cells, count: Any, status: WorkspaceStatus) -> Workspace:
     """The result; empty without a cell that is reached."""
     if status is not WorkspaceStatus.NOT_DEFINED and not count.any():
         status = WorkspaceStatus.EMPTY
-    count = count.astype(np.int64)
-    return Workspace(
-        *asked, cells.points, count, cells.size, cells.shape, cells.kind, cells.frame, status
-    )
+    grid = cells.points, count.astype(np.int64), cells.size, cells.shape, cells.kind, cells.frame
+    return Workspace(*asked, *grid, status)
 
 
 def _rotation(kind: str, orientation: ArrayLike | None, free: Any) -> Array | None:
