@@ -495,10 +495,10 @@ def test_every_path_in_a_t_region_is_followed(arm, free):
     ("call", "error", "words"),
     [
         (lambda: pf.workspace("puma560"), InvalidValueError, "load it first"),
-        (lambda: pf.workspace(TWO, resolution=10**6), InvalidValueError, "at most"),
+        (lambda: pf.workspace(TWO, resolution=10**6), InvalidValueError, "whole number"),
         (lambda: pf.workspace(TWO, "free"), InvalidValueError, "obstacles"),
         (lambda: pf.workspace(TWO, mask=[1, 1, 0, 0, 0, 1]), InvalidValueError, "orientation"),
-        (lambda: pf.workspace(TWO, resolution=6).contains([np.nan, 0]), InvalidValueError, "NaN"),
+        (lambda: pf.workspace(TWO, resolution=6).contains([np.nan, 0]), InvalidValueError, "nan"),
         (lambda: pf.workspace(TWO, free=lambda q: 1), ShapeError, "bool"),
         (lambda: pf.workspace(rm.load("gantry").with_table(
             replace(rm.load("gantry").table, lower=[-np.inf] * 6, upper=[np.inf] * 6)

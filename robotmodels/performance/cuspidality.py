@@ -256,10 +256,11 @@ def _by_search(
 
 def _signs_are_labels(factors: Factors, q: Array, labels: NDArray[np.str_]) -> bool:
     """Whether each word of the labels is the sign of a factor, the same way in all postures."""
-    ends = [[word[-1] for word in str(label).split()] for label in labels]
-    if len(ends) < _POSTURES or len({*map(len, ends)}) != 1 or not {"+", "-"}.issuperset(*ends):
+    ends = ["".join(word[-1] for word in str(label).split()) for label in labels]
+    same = len({*map(len, ends)}) == 1 and {*"".join(ends)} <= {"+", "-"}
+    if len(ends) < _POSTURES or not same:
         return False
-    signs = np.where(np.array(ends) == "+", 1, -1)
+    signs = np.where(np.array([*map(list, ends)]) == "+", 1, -1)
     own = np.where(factors.values(q) > 0.0, 1, -1)
     # a label that is the same in all postures tells nothing and needs no factor
     told = np.ptp(signs, axis=0) > 0
