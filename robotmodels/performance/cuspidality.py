@@ -257,7 +257,7 @@ def _by_search(
 def _signs_are_labels(factors: Factors, q: Array, labels: NDArray[np.str_]) -> bool:
     """Whether each word of the labels is the sign of a factor, the same way in all postures."""
     ends = ["".join(word[-1] for word in str(label).split()) for label in labels]
-    same = len({*map(len, ends)}) == 1 and {*"".join(ends)} <= {"+", "-"}
+    same = len({*map(len, ends)}) == 1 and {*"".join(ends)} == {"+", "-"}
     if len(ends) < _POSTURES or not same:
         return False
     signs = np.where(np.array([*map(list, ends)]) == "+", 1, -1)
