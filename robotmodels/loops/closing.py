@@ -1,4 +1,17 @@
-"""Closing of the cut loops: the passive joints at given positions of the actuated ones."""
+"""Closing of the cut loops: the passive joints at given positions of the actuated ones.
+
+Parameters
+----------
+q_actuated : array_like, shape (..., n_a)
+    Positions of the actuated joints, rad or m.
+q_guess : array_like, shape (..., n) or (..., n - n_a), optional
+    Posture of all joints in the desired assembly, or positions of the passive joints; default
+    passive joints at zero.
+
+References
+----------
+Book section 2.4 (iterative method).
+"""
 
 from __future__ import annotations
 
@@ -57,18 +70,6 @@ def close(
     Newton iterations keep the loops closed, which keeps the assembly of the guess. Where that
     fails, and with a guess of the passive joints alone, the iterations start at the positions
     themselves, and last at random passive joints. Each row is independent of the others.
-
-    Parameters
-    ----------
-    q_actuated : array_like, shape (..., n_a)
-        Positions of the actuated joints, rad or m.
-    q_guess : array_like, shape (..., n) or (..., n - n_a), optional
-        Posture of all joints in the desired assembly, or positions of the passive joints; default
-        passive joints at zero.
-
-    References
-    ----------
-    Book section 2.4 (iterative method).
 
     Examples
     --------
