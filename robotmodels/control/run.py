@@ -1,4 +1,32 @@
-"""Simulation of a controlled robot: plant, law, sampling, noise, contact; and its result."""
+"""Simulation of a controlled robot: plant, law, sampling, noise, contact; and its result.
+
+Parameters
+----------
+model, law : RobotModel and object
+    The plant, which may differ from the model of the law; a law: ``command(t, q, v, x)`` (n,),
+    ``state0`` (k,), ``rate(t, q, v, x)`` (k,).
+q0, v0 : array_like, shape (n,)
+    Positions and velocities at the start; default at rest.
+t : array_like
+    A duration in seconds, or ascending times (N,) of the samples of the result.
+environment : callable or sequence of callables, optional
+    Walls (`SpringWall`) or other functions of (t, T, twist) that return the wrench (6,) of the
+    tool on the environment. Default: free space.
+disturbance : callable or array_like (n,), optional
+    Torques that act on the joints, a function of (t, q, v) or constant.
+period, delay : float, optional
+    Sampling period, which laws that switch need, default continuous; time from a sample to its
+    torque, s.
+noise, rng : float or array_like; int or Generator, optional
+    Standard deviation of what is measured at samples: one number for positions and velocities,
+    or two, or three with that of wrenches; seed.
+**options
+    ``method`` (``"Radau"`` for stiff walls), ``max_evaluations``, ``progress`` of `simulate`.
+
+References
+----------
+Book sections 5.2.1, 5.2.2, 5.3.1 and 5.3.6.
+"""
 
 from __future__ import annotations
 
@@ -106,33 +134,6 @@ def run(
 
     Dry friction of the drives sticks; torques are limited to the efforts of the table's joints. A
     continuous law is integrated with the plant, a sampled one is held between samples.
-
-    Parameters
-    ----------
-    model, law : RobotModel and object
-        The plant, which may differ from the model of the law; a law: ``command(t, q, v, x)`` (n,),
-        ``state0`` (k,), ``rate(t, q, v, x)`` (k,).
-    q0, v0 : array_like, shape (n,)
-        Positions and velocities at the start; default at rest.
-    t : array_like
-        A duration in seconds, or ascending times (N,) of the samples of the result.
-    environment : callable or sequence of callables, optional
-        Walls (`SpringWall`) or other functions of (t, T, twist) that return the wrench (6,) of the
-        tool on the environment. Default: free space.
-    disturbance : callable or array_like (n,), optional
-        Torques that act on the joints, a function of (t, q, v) or constant.
-    period, delay : float, optional
-        Sampling period, which laws that switch need, default continuous; time from a sample to its
-        torque, s.
-    noise, rng : float or array_like; int or Generator, optional
-        Standard deviation of what is measured at samples: one number for positions and velocities,
-        or two, or three with that of wrenches; seed.
-    **options
-        ``method`` (``"Radau"`` for stiff walls), ``max_evaluations``, ``progress`` of `simulate`.
-
-    References
-    ----------
-    Book sections 5.2.1, 5.2.2, 5.3.1 and 5.3.6.
 
     Examples
     --------
