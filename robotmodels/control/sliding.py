@@ -155,7 +155,8 @@ def first_order(
         )
     constant = 0.0 if disturbance is None else disturbance
     push: Any = disturbance if callable(disturbance) else lambda t: constant
-    own: Any = law.reaching if isinstance(law, _Sliding) else lambda s, x: (law(s), NONE)
+    given: Any = law
+    own: Any = given.reaching if isinstance(law, _Sliding) else lambda s, x: (given(s), NONE)
     out[0] = s
     with np.errstate(over="ignore", invalid="ignore"):  # refused below
         for k in range(1, len(out)):

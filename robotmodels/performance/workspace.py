@@ -290,8 +290,15 @@ def _workspace(asked: Any, cells: Cells, count: Any, status: WorkspaceStatus) ->
     """The result; empty without a cell that is reached."""
     if status is not WorkspaceStatus.NOT_DEFINED and not count.any():
         status = WorkspaceStatus.EMPTY
-    grid = cells.points, count.astype(np.int64), cells.size, cells.shape, cells.kind, cells.frame
-    return Workspace(*asked, *grid, status)
+    grid: Any = (
+        cells.points,
+        count.astype(np.int64),
+        cells.size,
+        cells.shape,
+        cells.kind,
+        cells.frame,
+    )
+    return Workspace(*asked, *grid, status)  # type: ignore[reportCallIssue]
 
 
 def _rotation(kind: str, orientation: ArrayLike | None, free: Any) -> Array | None:
