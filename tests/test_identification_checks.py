@@ -14,7 +14,7 @@ from robotmodels.identification.checks import check_joints
 from robotmodels.identification.delay import SynchronisationStatus
 from robotmodels.identification.signals import zero_phase
 from robotmodels.logs import FindingKind, Severity, check_log, with_delay
-from robotmodels.logs.stretches import stretches
+from robotmodels.logs.channels import stretches
 
 
 def mistakes(n):
@@ -183,24 +183,23 @@ def test_what_cannot_be_judged_is_no_mistake(good):
 # --- delay between positions and torques ---------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def robot():
-    drive = rm.DriveParameters(Ia=np.full(6, 0.3), Fv=np.full(6, 2.0), Fc=np.full(6, 1.5))
-    return rm.load("rx90").with_drive(drive)
+DRIVE = rm.DriveParameters(Ia=np.full(6, 0.3), Fv=np.full(6, 2.0), Fc=np.full(6, 1.5))
+ROBOT = rm.load("rx90").with_drive(DRIVE)
 
 
-def simulated(model, rate=1000.0, late=0.0, seed=3):
+def simulated(rate=1000.0, late=0.0):
     """Noisy log of a robot, its torques late."""
     options = {"samples": round(6.0 * rate), "dt": 1.0 / rate, "period": 5.0, "size": 1.2}
-    moves, moved = (swinging(model, seed, late=x, **options) for x in (0.0, late))
-    noise = np.random.default_rng(seed).normal(size=(2, *moves[0].shape))
-    tau = rm.idm(model, *moved)
+    moves, moved = (swinging(ROBOT, 3, late=x, **options) for x in (0.0, late))
+    noise = np.random.default_rng(3).normal(size=(2, *moves[0].shape))
+    tau = rm.idm(ROBOT, *moved)
     return Log(1.0 / rate, moves[0] + 1e-4 * noise[0], tau + 0.05 * noise[1])
 
 
 @pytest.mark.parametrize(("rate", "late"), [(1000.0, -0.004), (5000.0, 0.0013)])
-def test_delays_of_simulated_logs_are_found_within_a_part_of_a_sample(robot, rate, late):
-    found = synchronisation(simulated(robot, rate, late), robot)
+def test_a_delay_is_found_within_a_part_of_a_sample_and_not_again_where_it_is_removed(rate, late):
+    log = simulated(rate, late)
+    found = synchronisation(log, ROBOT)
     assert found.status is SynchronisationStatus.FOUND
     assert found.delay == pytest.approx(late, abs=0.2e-3)
     assert found.delay == pytest.approx(late, abs=5.0 * found.standard_error)
@@ -208,39 +207,28 @@ def test_delays_of_simulated_logs_are_found_within_a_part_of_a_sample(robot, rat
     known = np.isfinite(found.joint_delays)
     assert known.sum() >= 3
     assert np.median(found.joint_delays[known]) == pytest.approx(late, abs=1e-3)
-
-
-def test_a_delay_that_is_removed_is_not_found_again(robot):
-    log = simulated(robot, late=0.0036)
-    again = synchronisation(with_delay(log, synchronisation(log, robot).delay), robot)
+    again = synchronisation(with_delay(log, found.delay), ROBOT)
     assert again.status.is_success
     assert not again.is_out_of_step
     assert abs(again.delay) < 0.05e-3
 
 
-def test_delays_beyond_those_that_are_tried_are_reported(robot):
-    log = simulated(robot, late=0.06)
-    found = synchronisation(log, robot)
+def test_delays_that_the_log_or_the_range_does_not_determine_are_reported():
+    log = simulated(late=0.06)
+    found = synchronisation(log, ROBOT)
     assert found.status is SynchronisationStatus.AT_THE_END
     assert not found.is_out_of_step
-    assert synchronisation(log, robot, within=0.1).delay == pytest.approx(0.06, abs=0.5e-3)
-    (finding,) = check_joints(log, robot)
+    assert synchronisation(log, ROBOT, within=0.1).delay == pytest.approx(0.06, abs=0.5e-3)
+    (finding,) = check_joints(log, ROBOT)
     assert finding.kind is FindingKind.OUT_OF_STEP
-
-
-def test_a_single_sine_determines_no_delay():
     one = rm.RobotModel.from_table(rm.DHTable(antecedent=[0], sigma=[0]))
     t = np.arange(0.0, 10.0, 0.001)[:, None]
-    found = synchronisation(Log(0.001, np.sin(t), np.cos(t - 0.3)), one)
+    found = synchronisation(Log(0.001, np.sin(t), np.cos(t - 0.3)), one)  # a single sine
     assert not found.is_out_of_step
     assert not found.status.is_success
-
-
-def test_motion_that_excites_little_is_named(robot):
-    log = simulated(robot)
     q = np.where(np.arange(6) == 0, log.q, 0.3)
-    found = {f.kind: f for f in check_joints(Log(log.dt, q, log.tau), robot)}
-    assert "base parameters" in found[FindingKind.NOT_EXCITING].sentence
+    kinds = {f.kind: f for f in check_joints(Log(log.dt, q, log.tau), ROBOT)}
+    assert "base parameters" in kinds[FindingKind.NOT_EXCITING].sentence
 
 
 # --- long logs -----------------------------------------------------------------------------------

@@ -27,7 +27,7 @@ from robotmodels.identification import (
 from robotmodels.identification.equations import segments
 from robotmodels.identification.forms import EquationForm
 from robotmodels.identification.method_names import method_of
-from robotmodels.identification.methods.essential import RULES, essential
+from robotmodels.identification.methods.base import RULES, essential
 from robotmodels.minimal_parameters import base_parameters
 from robotmodels.regressors import torque_regressor
 

@@ -29,8 +29,8 @@ from robotmodels.identification.report_tables import (
     standard_error_ratio,
     weak_parameters,
 )
-from robotmodels.identification.residuals import residual_diagnostics
 from robotmodels.identification.result_file import result_data
+from robotmodels.identification.validation import residual_diagnostics
 from robotmodels.logs.log import LogSource, RefusedRows
 from robotmodels.minimal_parameters import uniform_bodies
 

@@ -67,7 +67,7 @@ NOT_REACHED = "no motion within all limits was found"
 def run(arguments: argparse.Namespace) -> Report:
     """Run the command: search, and print or write."""
     from ..identification.excitation import exciting_trajectory, write_trajectory
-    from ..identification.excitation.files import excitation_data
+    from ..identification.excitation.result import excitation_data
     from ..obstacles import Box
     from ..trajectories import MotionLimits
 

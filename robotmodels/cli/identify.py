@@ -215,7 +215,7 @@ def real_bodies(
     result: IdentificationResult, prior: InertialParameters | None, asked: bool
 ) -> StandardParameters | None:
     """Physically consistent robot; unless requested, a failure is only reported."""
-    from ..identification.consistent import consistent_robot, prior_bodies
+    from ..identification.result import consistent_robot, prior_bodies
 
     robot = None
     try:

@@ -17,7 +17,6 @@ from .closed_loop import (
     tuned_controller,
 )
 from .comparison import compare_methods
-from .consistent import consistent_robot
 from .delay import synchronisation
 from .drive_gains import identify_drive_gains
 from .equations import equations, reduce_equations
@@ -26,13 +25,12 @@ from .fit import fit
 from .friction import fit_friction
 from .loads import KnownPayload, LoadedLog
 from .methods.linear import Irls, Ols, Ridge, Total, Wls
-from .methods.recursive import Recursive
 from .methods.robust import Robust
-from .methods.sequential import Sequential
+from .methods.sequential import Recursive, Sequential
 from .payload import identify_payload
 from .processing import choose_processing
 from .report import report
-from .result import IdentificationResult, predicted_torque, validate
+from .result import IdentificationResult, consistent_robot, predicted_torque, validate
 from .result_file import write_result
 from .signals import Processing
 from .validation import Errors, Validation

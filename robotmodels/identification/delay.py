@@ -12,8 +12,8 @@ from .._arrays import Array, Rebuilt, as_number
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..logs import Log
+from ..logs.channels import SAMPLES, stretches
 from ..logs.log import check_is_log
-from ..logs.stretches import SAMPLES, stretches
 from ..model import RobotModel, check_model
 from ..regressors import torque_regressor
 from .signals import Signals, central_differences, zero_phase

@@ -27,8 +27,7 @@ from .equations import Equations, equations, parameters_of, reduce_equations
 from .forms import EquationForm
 from .looped import looped_equations, looped_method
 from .method_names import method_of
-from .methods.base import Method
-from .methods.essential import essential
+from .methods.base import Method, essential
 from .processing import LEAST_EQUATIONS, checked_processing, processing_for
 from .result import FitDetails, IdentificationResult
 from .signals import Processing

@@ -11,9 +11,8 @@ from ..errors import InvalidValueError
 from .closed_loop import Didim, Instrumental, OutputError
 from .methods.base import Method
 from .methods.linear import Irls, Ols, Ridge, Total, Wls
-from .methods.recursive import Recursive
 from .methods.robust import Robust
-from .methods.sequential import Sequential
+from .methods.sequential import Recursive, Sequential
 
 _OBJECTS = ("prior", "controller")  # options that are objects and have no text form
 _WORDS = {"true": "True", "false": "False", "none": "None"}

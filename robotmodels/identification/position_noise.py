@@ -12,7 +12,7 @@ import numpy as np
 
 from .._arrays import Array
 from ..logs import Log
-from ..logs.stretches import resolution, stretches
+from ..logs.channels import resolution, stretches
 from ..minimal_parameters import BaseParameters
 from ..regressors import torque_regressor
 from .delay import representative_part

@@ -23,9 +23,8 @@ from .report_tables import (
     standard_error_ratio,
     weak_parameters,
 )
-from .residuals import SIGNIFICANCE, ResidualDiagnostics, residual_diagnostics
 from .result import IdentificationResult, check_result
-from .validation import poor_prediction
+from .validation import SIGNIFICANCE, ResidualDiagnostics, poor_prediction, residual_diagnostics
 
 if TYPE_CHECKING:
     from ..minimal_parameters import StandardParameters

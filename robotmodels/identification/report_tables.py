@@ -154,22 +154,11 @@ def _ranges(result: IdentificationResult) -> ReportTable:
 def processing_section(result: IdentificationResult) -> ReportSection:
     """Section on filters, decimation and dead bands, with the reasons."""
     chosen = result.equations.processing
-    filtered, decimated = "none", "none"
-    if chosen.cutoff is not None:
-        filtered = f"{chosen.cutoff:.4g} Hz (-3 dB), zero phase, order {chosen.order} twice"
-    if chosen.torque_cutoff is not None:
-        decimated = (
-            f"one of {chosen.decimation}, low-pass at {chosen.torque_cutoff:.4g} Hz, "
-            f"{chosen.rate:.4g} Hz after it"
-        )
-    bands = ", ".join(f"{width:.2g}" for width in chosen.dead_band)
+    filtered = "no filter" if chosen.cutoff is None else f"filter of order {chosen.order} twice"
     lines = (
-        f"* Low-pass of the positions: {filtered}.",
-        f"* Derivatives: central differences of order {chosen.accuracy}.",
-        f"* Decimation of regressor and torque: {decimated}.",
-        f"* Dead bands of the velocities, rad/s or m/s: {bands}.",
-        f"* Cut at both ends of each recording: {chosen.edges} samples.",
-        "Why: " + " ".join(chosen.notes),
+        *(f"* {note}" for note in chosen.notes),
+        f"* Zero phase, {filtered}; central differences of order {chosen.accuracy}; "
+        f"{chosen.rate:.4g} equations of each joint per second.",
     )
     return ReportSection("Processing", lines)
 

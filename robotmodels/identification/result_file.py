@@ -15,9 +15,7 @@ import numpy as np
 from .._json_data import json_data
 from ..drive import drive_kinds
 from ..errors import InvalidValueError
-from ..logs import Log
 from ..model import RobotModel, to_urdf
-from .consistent import consistent_robot
 from .report_tables import (
     correlated_estimates,
     group_names,
@@ -27,11 +25,11 @@ from .report_tables import (
     standard_error_ratio,
     weak_parameters,
 )
-from .residuals import residual_diagnostics
-from .result import IdentificationResult, check_result
+from .result import IdentificationResult, check_result, consistent_robot
+from .validation import residual_diagnostics
 
 if TYPE_CHECKING:
-    from ..minimal_parameters import BaseParameters, StandardParameters
+    from ..minimal_parameters import StandardParameters
 
 FORMAT = 2
 """Version of the format, increased when the meaning of an entry changes."""
@@ -95,9 +93,19 @@ def result_data(
     check_result(result)
     base, estimate, details = result.base, result.estimate, result.details
     groups, units, ends = group_names(result), parameter_units(result), intervals(estimate)
-    ratio = standard_error_ratio(result)
     residuals = asdict(residual_diagnostics(result.equations, result.values))
-    processing = result.equations.processing
+    processing, log = result.equations.processing, result.equations.log
+    sha256 = hashlib.sha256()
+    for array in (log.q, log.tau):
+        for first in range(0, len(log), _ROWS):
+            part = np.ascontiguousarray(array[first : first + _ROWS], dtype="<f8")
+            sha256.update(part.tobytes())
+    kept = ("dt", "duration", "starts", "delay", "sources", "refused", "notes")
+    measured = [name for name in ("v", "a", "q_ref", "v_ref") if getattr(log, name) is not None]
+    options = {  # of a robot its parameters
+        name: dict(zip(base.names, base.values(x), strict=True)) if isinstance(x, RobotModel) else x
+        for name, x in result.method.options().items()
+    }
     data = {
         "format": FORMAT,
         "chapter": "identification",
@@ -106,7 +114,7 @@ def result_data(
         "method": {
             "name": result.method.name,
             "title": result.method.title,
-            "options": {name: _option(base, x) for name, x in result.method.options().items()},
+            "options": options,
             "iterations": estimate.iterations,
             "correlation_lags": details.correlation_lags,
             "notes": estimate.notes,
@@ -115,22 +123,25 @@ def result_data(
             "drive": [kind.value for kind in drive_kinds(base.drive)],
             "friction": None if base.friction is None else repr(base.friction),
         },
-        "data": log_data(result.equations.log),
+        "data": {
+            "samples": len(log),
+            "joints": log.names,
+            "sha256": sha256.hexdigest(),
+            "measured": measured,
+        }
+        | {name: getattr(log, name) for name in kept},
         "processing": asdict(processing) | {"torque_cutoff": processing.torque_cutoff},
-        "parameters": [
-            {
-                "name": name,
-                "unit": units[k],
-                "value": result.values[k],
-                "standard_error": result.standard_errors[k],
-                "relative_error": result.relative_errors[k],
-                "interval_95": ends[k],
-                "iid_standard_error": details.iid_standard_errors[k],
-                "standard_error_ratio": ratio[k],
-                "stands_for": dict(base.regrouping[name]),
-            }
-            for k, name in enumerate(result.names)
-        ],
+        "parameters": _rows(
+            name=result.names,
+            unit=units,
+            value=result.values,
+            standard_error=result.standard_errors,
+            relative_error=result.relative_errors,
+            interval_95=ends,
+            iid_standard_error=details.iid_standard_errors,
+            standard_error_ratio=standard_error_ratio(result),
+            stands_for=[dict(base.regrouping[name]) for name in result.names],
+        ),
         "covariance": estimate.covariance,
         "sigma": estimate.sigma,
         "unidentifiable": details.unidentifiable,
@@ -141,22 +152,12 @@ def result_data(
         "condition": result.condition,
         "scaled_condition": result.scaled_condition,
         "rank_gap": details.rank_gap,
-        "equations": [
-            {"of": name, "used": used, "in_dead_band": left}
-            for name, used, left in zip(
-                groups, result.factors.counts, result.factors.left_out, strict=True
-            )
-        ],
-        "residuals": [
-            {"of": name} | {key: values[j] for key, values in residuals.items()}
-            for j, name in enumerate(groups)
-        ],
-        "errors": {
-            "joints": result.model.table.joint_names,
-            "in_sample": result.validation.in_sample,
-            "held_out": result.validation.held_out,
-            "nominal": result.validation.nominal,
-        },
+        "equations": _rows(
+            of=groups, used=result.factors.counts, in_dead_band=result.factors.left_out
+        ),
+        "residuals": _rows(of=groups, **residuals),
+        "errors": {"joints": result.model.table.joint_names}
+        | {name: getattr(result.validation, name) for name in ("in_sample", "held_out", "nominal")},
         "consistent": None if robot is None else _robot(robot),
         "versions": {"python": platform.python_version()} | {n: _version(n) for n in _PACKAGES},
         "notes": result.notes,
@@ -164,27 +165,9 @@ def result_data(
     return json_data(data)
 
 
-def _option(base: BaseParameters, value: Any) -> Any:
-    """An option of a method; of a robot its parameters."""
-    if isinstance(value, RobotModel):
-        return dict(zip(base.names, base.values(value), strict=True))
-    return value
-
-
-def log_data(log: Log) -> dict[str, Any]:
-    """Origin of a log, with hashes of its data."""
-    names = ("dt", "duration", "starts", "delay", "sources", "refused", "notes")
-    measured = [name for name in ("v", "a", "q_ref", "v_ref") if getattr(log, name) is not None]
-    data = {"samples": len(log), "joints": log.names, "sha256": _hash(log), "measured": measured}
-    return data | {name: getattr(log, name) for name in names}
-
-
-def _hash(log: Log) -> str:
-    total = hashlib.sha256()
-    for array in (log.q, log.tau):
-        for first in range(0, len(log), _ROWS):
-            total.update(np.ascontiguousarray(array[first : first + _ROWS], dtype="<f8").tobytes())
-    return total.hexdigest()
+def _rows(**columns: Any) -> list[dict[str, Any]]:
+    """Columns of a table as rows."""
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def _robot(robot: StandardParameters) -> dict[str, Any]:

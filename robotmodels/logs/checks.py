@@ -21,9 +21,8 @@ import numpy as np
 from .._arrays import Array
 from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
-from .bad_samples import BadSamples, bad_samples
+from .channels import BadSamples, bad_samples, moves, runs, spread, stretches
 from .log import Log, check_is_log
-from .stretches import moves, runs, spread, stretches
 
 _LONGEST_PERIOD = 0.5  # s, of a log that resolves the motion of a robot
 _SHORTEST_PERIOD = 2.1e-5  # s, shorter than that of the current loop of a drive

@@ -17,9 +17,8 @@ from ..errors import InvalidValueError
 from ..file_units import AngleUnit, LengthUnit, TimeUnit, as_file_unit
 from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
-from .columns import Quantity
+from .columns import Quantity, Request, read_samples
 from .log import Log, LogSource, join_logs
-from .samples import Request, read_samples
 from .tables import Choice, LogTable, open_log_table, table_of
 from .time_base import regular_rows
 

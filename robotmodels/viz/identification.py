@@ -40,9 +40,9 @@ from ..errors import ShapeError
 from ..identification.excitation import ExcitingTrajectory
 from ..identification.excitation.result import ExcitationStatus
 from ..identification.report_tables import WEAK, group_names, group_units
-from ..identification.residuals import residual_diagnostics
 from ..identification.result import IdentificationResult, check_result, predicted_torque, validate
 from ..identification.signals import piece_signals, pieces
+from ..identification.validation import residual_diagnostics
 from ..logs import Log
 from . import over_time, style
 from .style import BAND, DASHED, INK, PAGE, PALE, PALETTE, ZERO, Axes, Figure, Look

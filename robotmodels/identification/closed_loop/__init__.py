@@ -1,8 +1,7 @@
 """Methods that simulate the controlled robot: instruments, DIDIM, output error, and a test."""
 
-from .hausman import hausman_test
 from .loop import Controller, tuned_controller
-from .methods import Didim, Instrumental, OutputError
+from .methods import Didim, Instrumental, OutputError, hausman_test
 from .simulation import simulated_log
 
 __all__ = [

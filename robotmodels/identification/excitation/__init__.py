@@ -4,7 +4,6 @@ Book section 1.6.2.3.
 """
 
 from .exciting import exciting_trajectory
-from .files import write_trajectory
-from .result import ExcitingTrajectory
+from .result import ExcitingTrajectory, write_trajectory
 
 __all__ = ["ExcitingTrajectory", "exciting_trajectory", "write_trajectory"]
