@@ -33,9 +33,9 @@ def test_the_matrix_of_a_general_arm_has_its_posture_among_its_eigenvalues(seed,
             links[k] = se3.from_rpy(rng.uniform(-2.0, 2.0, 3), rng.uniform(-0.7, 0.7, 3))
             T = T @ links[k]
     links[5] = se3.inverse(T)
-    M, P, Q = np.empty((1, 16, 16)), np.empty((1, 14, 27)), np.empty((1, 14, 8))
+    M, P, Q = np.zeros((1, 16, 16)), np.empty((1, 14, 27)), np.empty((1, 14, 8))
     order, angle, quality = np.empty((1, 8), dtype=np.int64), np.empty(1), np.empty(1)
-    eigenproblems(kinds, links[None], swapped, M, P, Q, order, angle, quality)
+    eigenproblems(kinds, links[None], swapped, M, (P, Q, order, angle, quality))
     assert quality[0] > 1e-6
     asked = np.tan(0.5 * (q[2] - angle[0]))
     assert np.abs(np.linalg.eigvals(M[0]) - asked).min() < 1e-7 * max(1.0, abs(asked))

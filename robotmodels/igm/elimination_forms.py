@@ -80,35 +80,19 @@ def solve_form(
             links[:, place] = D[6] @ se3.inverse(poses) @ D[0]
         elif j == last:
             links[:, place] = se3.inverse(D[0]) @ poses @ se3.inverse(D[6])
-    M, P, Q = np.empty((N, 16, 16)), np.empty((N, 14, 27)), np.empty((N, 14, 8))
-    order, angle, quality = np.empty((N, 8), np.int64), np.empty(N), np.empty(N)
-    report = np.empty((N, 2))
-    swapped = int(form.swapped)
-    eigenproblems(form.kinds, links, swapped, M, P, Q, order, angle, quality)
+    M, report, quality = np.zeros((N, 16, 16)), np.empty((N, 2)), np.empty(N)
+    parts = np.empty((N, 14, 27)), np.empty((N, 14, 8)), np.empty((N, 8), np.int64), np.empty(N)
+    loop = form.kinds, form.joints, float(form.direction), int(form.swapped)
+    eigenproblems(form.kinds, links, loop[3], M, (*parts, quality))
     failed = ~np.all(np.isfinite(M), axis=(1, 2))
     M[failed] = 0.0
     eigenvalues = np.linalg.eigvals(M).astype(np.complex128)
     eigenvalues[failed] = 1j
     tolerance = np.array([TOLERANCE / min(unit, 1.0), TOLERANCE])
     solutions_of_eigenvalues(
-        chain.sigma,
-        D,
-        poses,
-        tolerance,
-        form.kinds,
-        form.joints,
-        float(form.direction),
-        links,
-        swapped,
-        eigenvalues,
-        P,
-        Q,
-        order,
-        angle,
-        found.q,
-        found.count,
-        report,
-    )
+        chain.sigma, D, poses, tolerance, loop, links, eigenvalues, (*parts, quality),
+        (found.q, found.count, report),
+    )  # fmt: skip
     missing = (found.count != report[:, 0]) | (quality < POOR) | failed
     return missing | (report[:, 1] > ROUGH), report[:, 1]
 

@@ -69,10 +69,8 @@ def solved_positions(
     """Configurations of points ``(N, 3)`` of R_0; see `kernels.pieper.position_solutions`."""
     from .kernels import pieper
 
-    slides = bool(np.any(kinds == 1))
-    solve = pieper.position_solutions_with_slides if slides else pieper.position_solutions
     N = len(points)
     out = np.full((N, MOST, 3), np.nan), np.full((N, MOST), np.nan), np.full((N, MOST), -1)
     rows = np.ascontiguousarray(points), np.ascontiguousarray(references)
-    solve(kinds, D, *rows, np.array(limits), pieper.scratch(), out)
+    pieper.position_solutions(kinds, D, *rows, np.array(limits), pieper.scratch(), out)
     return out

@@ -29,9 +29,12 @@ import numpy as np
 from numba import types
 
 from ...kernels._compile import INT, INTS, NOTHING, OUT1, OUT3, Floats, Ints, compiled
+from ...kernels.linear_systems import factor, solve
 
 LINKS = types.Array(types.float64, 4, "C", readonly=True)
 ORDERS = types.Array(types.int64, 2, "C")
+PARTS = types.Tuple((OUT3, OUT3, ORDERS, OUT1, OUT1))
+Parts = tuple[Floats, Floats, Ints, Floats, Floats]
 ANGLES = 12  # candidates for the angle at which the leading matrix is inverted
 
 
@@ -167,47 +170,6 @@ def reflect(Q: Floats, P: Floats, order: Ints) -> float:
 
 
 @compiled()
-def factor(A: Floats, pivots: Ints) -> float:
-    """LU factors of A with row exchanges, in place; smallest pivot over the largest."""
-    n = A.shape[0]
-    smallest, largest = np.inf, 0.0
-    for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if abs(A[i, k]) > abs(A[best, k]):
-                best = i
-        pivots[k] = best
-        for j in range(n):
-            A[k, j], A[best, j] = A[best, j], A[k, j]
-        size = abs(A[k, k])
-        smallest, largest = min(smallest, size), max(largest, size)
-        if size == 0.0:
-            # a singular matrix is still usable for inverse iteration
-            A[k, k] = 1e-300
-        for i in range(k + 1, n):
-            A[i, k] /= A[k, k]
-            for j in range(k + 1, n):
-                A[i, j] -= A[i, k] * A[k, j]
-    return smallest / largest if largest > 0.0 else 0.0
-
-
-@compiled()
-def solve(A: Floats, pivots: Ints, x: Floats) -> None:
-    """Solve ``A y = x`` from the factors, x (n,) overwritten by y."""
-    n = x.shape[0]
-    for k in range(n):
-        p = pivots[k]
-        x[k], x[p] = x[p], x[k]
-    for i in range(n):
-        for k in range(i):
-            x[i] -= A[i, k] * x[k]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            x[i] -= A[i, k] * x[k]
-        x[i] /= A[i, i]
-
-
-@compiled()
 def orthonormal_rows(Z: Floats) -> bool:
     """Gram and Schmidt's method, twice, on the rows of Z in place; False if they are dependent."""
     m, n = Z.shape
@@ -234,17 +196,15 @@ def orthonormal_rows(Z: Floats) -> bool:
 
 
 @compiled()
-def widen(
-    kind: int, E: Floats, row: int, at: int, swapped: int, m: int, A: Floats, line: int
-) -> None:
+def widen(kind: int, E: Floats, row: int, swapped: int, m: int, A: Floats, line: int) -> None:
     """One of the twelve equations: one in joints 3, 4 times factor m = 0, 1 of joint nu.
 
     Factors: cos(h), sin(h) of the half angle if revolute, 1, r if prismatic. nu is joint 3, or 4 if
-    ``swapped``. Reads nine coefficients at ``E[row, at]``, writes the first twelve of ``A[line]``.
+    ``swapped``. Reads nine coefficients of ``E[row]``, writes the first twelve of ``A[line]``.
     """
     step_nu, step_mu = (1, 3) if swapped else (3, 1)
     for mu in range(3):
-        k = at + step_mu * mu
+        k = step_mu * mu
         one, two, three = E[row, k], E[row, k + step_nu], E[row, k + 2 * step_nu]
         if kind == 1:
             A[line, mu + 9 - 9 * m] = 0.0
@@ -268,26 +228,17 @@ def at_angle(P: Floats, kind: int, swapped: int, angle: float, A: Floats) -> Non
         for k in range(9):
             E[0, k] = P[8 + e, k] + c * P[8 + e, 9 + k] + s * P[8 + e, 18 + k]
         for m in range(2):
-            widen(kind, E, 0, 0, swapped, m, A, 2 * e + m)
+            widen(kind, E, 0, swapped, m, A, 2 * e + m)
 
 
-@compiled(NOTHING(INTS, LINKS, INT, OUT3, OUT3, OUT3, ORDERS, OUT1, OUT1))
-def eigenproblems(
-    kinds: Ints,
-    links: Floats,
-    swapped: int,
-    M: Floats,
-    P: Floats,
-    Q: Floats,
-    order: Ints,
-    angle: Floats,
-    quality: Floats,
-) -> None:
+@compiled(NOTHING(INTS, LINKS, INT, OUT3, PARTS))
+def eigenproblems(kinds: Ints, links: Floats, swapped: int, M: Floats, parts: Parts) -> None:
     """Reduce poses to eigenproblems of size 16 for tan((q_2 - angle) / 2).
 
-    Shapes: kinds (6,); links (N, 6, 4, 4) -> M (N, 16, 16); P (N, 14, 27); Q (N, 14, 8);
-    order (N, 8); angle, quality (N,).
+    Shapes: kinds (6,); links (N, 6, 4, 4) -> M (N, 16, 16), zeros before; parts: P (N, 14, 27),
+    Q (N, 14, 8), order (N, 8), angle and quality (N,).
     """
+    P, Q, order, angle, quality = parts
     kind_nu = kinds[4] if swapped else kinds[3]
     F, X = np.empty((14, 9)), np.empty((14, 9))
     K0, K1, K2 = np.empty((12, 12)), np.empty((12, 12)), np.empty((12, 12))
@@ -314,19 +265,19 @@ def eigenproblems(
         best, lead = -1.0, 0.0
         for k in range(ANGLES):
             at_angle(Pn, kind_nu, swapped, 2.0 * pi * k / ANGLES, K2)
-            size = factor(K2, pivots)
+            size, largest = factor(K2, pivots), 0.0
+            for i in range(12):
+                largest = max(largest, abs(K2[i, i]))
+            size /= largest
             if size > best:
                 best, lead = size, 2.0 * pi * k / ANGLES
         angle[n] = lead - pi
-        for i in range(16):
-            for j in range(16):
-                M[n, i, j] = 0.0
         # the subspace of t = +-i
         for i in range(4):
             for m in range(2):
                 r = 2 * i + m
-                widen(kind_nu, X, 3 * i, 0, swapped, m, Z, r)
-                widen(kind_nu, X, 3 * i + 1, 0, swapped, m, Z, 8 + r)
+                widen(kind_nu, X, 3 * i, swapped, m, Z, r)
+                widen(kind_nu, X, 3 * i + 1, swapped, m, Z, 8 + r)
                 for j in range(12):
                     Z[r, 12 + j] = -Z[8 + r, j]
                     Z[8 + r, 12 + j] = Z[r, j]

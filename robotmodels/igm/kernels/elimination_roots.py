@@ -16,7 +16,6 @@ from ...kernels._compile import (
     INT,
     INTS,
     NOTHING,
-    OUT1,
     OUT2,
     OUT3,
     STACK,
@@ -25,12 +24,13 @@ from ...kernels._compile import (
     Ints,
     compiled,
 )
+from ...kernels.linear_systems import factor, solve
 from .chain import forward, jacobian, pose_error, wrapped
-from .elimination import LINKS, ORDERS, at_angle, factor, move_line, solve, turn_line
+from .elimination import LINKS, PARTS, Parts, at_angle, move_line, turn_line
 
-FLOAT = types.float64
+FORM = types.Tuple((INTS, INTS, types.float64, INT))
 COMPLEX = types.Array(types.complex128, 2, "C")
-COUNTS = types.Array(types.int64, 1, "C")
+OUT = types.Tuple((OUT3, types.Array(types.int64, 1, "C"), OUT2))
 NEARLY_REAL = 2e-2  # imaginary part of an angle up to which its real part is tried [rad]
 MERGED = 1e-3  # imaginary part up to which a pair counts as a double root that rounding split [rad]
 MERGE = 1e-6  # solutions closer than this in every joint are the same [rad, or arm lengths]
@@ -195,51 +195,26 @@ def keep(sigma: Ints, q: Floats, found: Floats, count: int) -> int:
     return count
 
 
-@compiled(
-    NOTHING(
-        INTS,
-        STACK,
-        STACK,
-        VECTOR,
-        INTS,
-        INTS,
-        FLOAT,
-        LINKS,
-        INT,
-        COMPLEX,
-        OUT3,
-        OUT3,
-        ORDERS,
-        OUT1,
-        OUT3,
-        COUNTS,
-        OUT2,
-    )
-)
+@compiled(NOTHING(INTS, STACK, STACK, VECTOR, FORM, LINKS, COMPLEX, PARTS, OUT))
 def solutions_of_eigenvalues(
     sigma: Ints,
     D: Floats,
     poses: Floats,
     tolerance: Floats,
-    kinds: Ints,
-    joints: Ints,
-    direction: float,
+    form: tuple[Ints, Ints, float, int],
     links: Floats,
-    swapped: int,
     eigenvalues: NDArray[np.complex128],
-    P: Floats,
-    Q: Floats,
-    order: Ints,
-    angle: Floats,
-    found: Floats,
-    count: Ints,
-    report: Floats,
+    parts: Parts,
+    out: tuple[Floats, Ints, Floats],
 ) -> None:
     """Follow eigenvalues back to configurations, polish them and keep those not found before.
 
-    ``report (N, 2)`` receives the number of real eigenvalues, pairs that are nearly real
-    included, and the largest distance by which polishing moved the solution of a real one [rad].
+    ``form``: kinds, joints, direction, swapped; ``out``: solutions, counts and report (N, 2), which
+    receives the number of real eigenvalues, pairs that are nearly real included, and the largest
+    distance by which polishing moved the solution of a real one [rad].
     """
+    (kinds, joints, direction, swapped), (found, count, report) = form, out
+    P, Q, order, angle, _ = parts
     kind_nu = kinds[4] if swapped else kinds[3]
     kind_mu = kinds[3] if swapped else kinds[4]
     A, pivots = np.empty((12, 12)), np.empty(12, np.int64)

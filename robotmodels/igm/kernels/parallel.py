@@ -158,7 +158,7 @@ def parallel_postures(
             pairs = square_pairs(E, work, slack, references[n, 0], alpha)
         else:
             reference[1], reference[2] = -references[n, 4], references[n, 0]
-            pairs = turning_pair(True, (1.0, slack), 1e-11, reference, work, None)
+            pairs = turning_pair(True, (1.0, slack), reference, work)
         for i in range(pairs):
             x0, x4 = found[i, 0], -found[i, 1]
             # alpha Rz(-x_5) = beta

@@ -68,6 +68,7 @@ def scratch() -> Scratch:
 
 
 SCRATCH = typeof(scratch())
+Limits = tuple[float, float]
 
 
 @compiled(counted=False)
@@ -115,15 +116,12 @@ def value(a: Floats, i: int, u: float, v: float) -> float:
     return a[i, 0] + u * a[i, 1] + v * a[i, 2]
 
 
-@compiled(counted=False, inlined=True)
-def roots_of_product(work: Scratch, turning: bool, slack: float, slides: None) -> int:
+@compiled(counted=False)
+def roots_of_product(work: Scratch, turning: bool, slack: float) -> int:
     """Roots of ``work.g``, a product of two functions of the last joint."""
-    if slides is None:
+    if turning:
         return trigonometric_roots(work.g, work.roots, work.work, slack)
-    else:
-        if turning:
-            return trigonometric_roots(work.g, work.roots, work.work, slack)
-        return polynomial_roots(work.g, work.roots, work.work)
+    return polynomial_roots(work.g, work.roots, work.work)
 
 
 @compiled(counted=False)
@@ -144,25 +142,16 @@ def roots_of_linear(
 
 @compiled(counted=False, inlined=True)
 def point_solutions(
-    kinds: Ints,
-    E1: Floats,
-    E2: Floats,
-    w: Floats,
-    p: Floats,
-    limits: tuple[float, float],
-    reference: Floats,
-    work: Scratch,
-    slides: None,
+    kinds: Ints, E1: Floats, E2: Floats, limits: Limits, reference: Floats, work: Scratch
 ) -> int:
-    """All ``x (m, 3)`` with ``M_a E_1 M_b E_2 M_c w = p``, in ``work``. Returns how many.
+    """All ``x (m, 3)`` with ``M_a E_1 M_b E_2 M_c w = p``, all in ``work``. Returns how many.
 
     ``limits``: length of the arm, and relative overshoot of a double root.
     """
-    # free[i] gets a bit (1, 2, 4) for each joint whose value was taken from the reference; slides
-    # is None where all three turn: what only slides need is then not compiled
+    # free[i] gets a bit (1, 2, 4) for each joint whose value was taken from the reference
     last, middle, first = kinds[2] == 0, kinds[1] == 0, kinds[0] == 0
     size, zero = limits[0], 1e-11 * limits[0]
-    f, length, row, b, x = work.f, work.length, work.row, work.b, work.x
+    f, length, row, b, x, w, p = work.f, work.length, work.row, work.b, work.x, work.w, work.p
     # f = E_2 M_c w and its squared length, functions of the last joint
     for i in range(5):
         length[i] = 0.0
@@ -192,13 +181,10 @@ def point_solutions(
             b[i, m] -= row[i, 2] * f[2, m]
             if not middle:
                 b[i, m] -= row[i, 0] * f[0, m] + row[i, 1] * f[1, m]
-    if slides is None:
-        count = turning_pair(last, limits, zero, reference, work, slides)
+    if middle:
+        count = turning_pair(last, limits, reference, work)
     else:
-        if middle:
-            count = turning_pair(last, limits, zero, reference, work, slides)
-        else:
-            count = sliding_pair(lam, last, limits, zero, reference, work, slides)
+        count = sliding_pair(lam, last, limits, reference, work)
     on_axis = first and hypot(p[0], p[1]) <= zero
     for i in range(count):
         xc, xb = work.found[i, 0], work.found[i, 1]
@@ -230,14 +216,7 @@ def angle_between(a0: float, a1: float, b0: float, b1: float) -> float:
 
 
 @compiled(counted=False)
-def turning_pair(
-    last: bool,
-    limits: tuple[float, float],
-    zero: float,
-    reference: Floats,
-    work: Scratch,
-    slides: None,
-) -> int:
+def turning_pair(last: bool, limits: Limits, reference: Floats, work: Scratch) -> int:
     """Two equations in two joints, ``row_i . Rot(x_b) (f_x, f_y) = b_i``: eliminate the turn x_b.
 
     ``b`` and ``f`` are functions of the other joint x_c. Writes pairs (x_c, x_b) to ``found``,
@@ -245,7 +224,7 @@ def turning_pair(
     """
     f, row, b, h, g = work.f, work.row, work.b, work.h, work.g
     roots, found, marks = work.roots, work.found, work.marks
-    size, slack = limits
+    (size, slack), zero = limits, 1e-11 * limits[0]
     n0, n1 = hypot(row[0, 0], row[0, 1]), hypot(row[1, 0], row[1, 1])
     det = row[0, 0] * row[1, 1] - row[0, 1] * row[1, 0]
     count, mark = 0, 0
@@ -259,16 +238,14 @@ def turning_pair(
         for i in range(2):
             add_product(h, i, h, i, last, 1.0, g)
             add_product(f, i, f, i, last, -1.0, g)
-        count = roots_of_product(work, last, slack * size * size, slides)
+        count = roots_of_product(work, last, slack * size * size)
         for i in range(count):
             u, v = basis(last, roots[i])
             fx, fy = value(f, 0, u, v), value(f, 1, u, v)
             found[i, 0], found[i, 1], marks[i] = roots[i], reference[1], 2
             if hypot(fx, fy) > zero:
-                found[i, 1], marks[i] = (
-                    angle_between(fx, fy, value(h, 0, u, v), value(h, 1, u, v)),
-                    0,
-                )
+                found[i, 1] = angle_between(fx, fy, value(h, 0, u, v), value(h, 1, u, v))
+                marks[i] = 0
         return count
     # the rows are parallel (axes that meet, or are parallel): one combination of the equations
     # is free of the second joint
@@ -299,22 +276,14 @@ def turning_pair(
 
 
 @compiled(counted=False)
-def sliding_pair(
-    lam: float,
-    last: bool,
-    limits: tuple[float, float],
-    zero: float,
-    reference: Floats,
-    work: Scratch,
-    slides: None,
-) -> int:
+def sliding_pair(lam: float, last: bool, limits: Limits, reference: Floats, work: Scratch) -> int:
     """The same with a sliding joint x_b: ``row_i z x_b + lam_i (2 f_z x_b + x_b^2) = b_i``.
 
     Only the second equation has the quadratic term, and only if the first joint turns.
     """
     f, row, b, h, g = work.f, work.row, work.b, work.h, work.g
     roots, lengths, found, marks = work.roots, work.lengths, work.found, work.marks
-    size, slack = limits
+    (size, slack), zero = limits, 1e-11 * limits[0]
     count, mark = 0, 0
     main = 0 if lam > 0.0 or abs(row[0, 2]) >= abs(row[1, 2]) else 1
     other = 1 - main
@@ -330,7 +299,7 @@ def sliding_pair(
             for m in range(5):
                 g[m] = -b[other, m] if m < 3 else 0.0
             add_product(h, 1, h, 0, last, 1.0, g)
-            outer = roots_of_product(work, last, slack * size, slides)
+            outer = roots_of_product(work, last, slack * size)
         else:
             outer = roots_of_linear(h, 1, last, roots, slack * size, zero)
         if outer < 0:
@@ -415,7 +384,8 @@ def concurrent_postures(
     Shapes: links (N, 6, 4, 4); ``meeting`` holds the height of the point on axis 3 and on axis 5.
     ``backwards`` solves the first three joints from the other end, with the links ``pair``.
     """
-    x, marks, w, p = work.x, work.free, work.w, work.p
+    x, marks = work.x, work.free
+    start, end = (work.p, work.w) if backwards else (work.w, work.p)
     y, wrist_marks = np.zeros((2, 3)), np.zeros(2, np.int64)
     order, reference = np.zeros(3, np.int64), np.zeros(3)
     unit, limits = np.zeros((3, 4)), (size, slack)
@@ -425,15 +395,15 @@ def concurrent_postures(
     for n in range(links.shape[0]):
         E = links[n]
         for i in range(3):
-            w[i] = E[2, i, 2] * meeting[0] + E[2, i, 3]
-            p[i] = E[5, 2, i] * meeting[1]
+            start[i] = E[2, i, 2] * meeting[0] + E[2, i, 3]
+            end[i] = E[5, 2, i] * meeting[1]
             for j in range(3):
-                p[i] -= E[5, j, i] * E[5, j, 3]
+                end[i] -= E[5, j, i] * E[5, j, 3]
         for i in range(3):
             order[i] = kinds[2 - i if backwards else i]
             reference[i] = -references[n, 2 - i] if backwards else references[n, i]
-        three, start, end = (pair, p, w) if backwards else (E, w, p)
-        m = point_solutions(order, three[0], three[1], start, end, limits, reference, work, 0)
+        three = pair if backwards else E
+        m = point_solutions(order, three[0], three[1], limits, reference, work)
         count = 0
         for i in range(m):
             if backwards:
@@ -458,10 +428,10 @@ def concurrent_postures(
 
 @compiled(counted=False)
 def improved_point(
-    kinds: Ints, E1: Floats, p: Floats, size: float, n: int, work: Scratch
+    kinds: Ints, E1: Floats, size: float, n: int, work: Scratch
 ) -> tuple[float, float]:
     """Newton steps on solution n, in place: error, and determinant of the Jacobian."""
-    f, J, x = work.f, work.h, work.x[n]
+    f, J, x, p = work.f, work.h, work.x[n], work.p
     a, b, c = x[0], x[1], x[2]
     least, least_det = np.inf, 0.0
     for _ in range(STEPS):
@@ -474,12 +444,8 @@ def improved_point(
         t0, t1, t2 = 0.0, 0.0, 1.0
         if kinds[1] == 0:
             cb, sb = cos(b), sin(b)
-            y0, y1, d0, d1 = (
-                cb * y0 - sb * y1,
-                sb * y0 + cb * y1,
-                cb * d0 - sb * d1,
-                sb * d0 + cb * d1,
-            )
+            y0, y1 = cb * y0 - sb * y1, sb * y0 + cb * y1
+            d0, d1 = cb * d0 - sb * d1, sb * d0 + cb * d1
             t0, t1, t2 = -y1, y0, 0.0
         else:
             y2 += b
@@ -519,8 +485,8 @@ def triple(A: Floats, i: int, B: Floats, j: int, C: Floats, k: int) -> float:
     )
 
 
-@compiled(counted=False)
-def positions(
+@compiled(NOTHING(INTS, STACK, MATRIX, MATRIX, VECTOR, SCRATCH, types.Tuple((OUT3, OUT2, MARKS))))
+def position_solutions(
     kinds: Ints,
     D: Floats,
     points: Floats,
@@ -528,13 +494,17 @@ def positions(
     limits: Floats,
     work: Scratch,
     out: tuple[Floats, Floats, Ints],
-    slides: None,
 ) -> None:
-    """See `position_solutions`; ``slides`` as in `point_solutions`."""
-    x, free, w, p, turning = work.x, work.free, work.w, work.p, 0
+    """Configurations of three joints that bring the tool's origin to points of R_0.
+
+    Shapes: D (4, 4, 4); points, references (N, 3) -> q (N, 4, 3); residual, marks (N, 4).
+    """
+    # limits: length of the arm, relative overshoot of a double root, largest error. marks stay
+    # negative in rows without a solution; bits 1, 2, 4: joints at their reference, 8: double root
+    x, free, p, turning = work.x, work.free, work.p, 0
     (q, residual, marks), size, pair = out, limits[0], (limits[0], limits[1])
     for i in range(3):
-        w[i] = D[3, i, 3]
+        work.w[i] = D[3, i, 3]
         turning += 1 - kinds[i]
     for n in range(points.shape[0]):
         for i in range(3):
@@ -542,9 +512,8 @@ def positions(
             for j in range(3):
                 p[i] += D[0, j, i] * (points[n, j] - D[0, j, 3])
         count = 0
-        found = point_solutions(kinds, D[1], D[2], w, p, pair, references[n], work, slides)
-        for i in range(found):
-            error, det = improved_point(kinds, D[1], p, size, i, work)
+        for i in range(point_solutions(kinds, D[1], D[2], pair, references[n], work)):
+            error, det = improved_point(kinds, D[1], size, i, work)
             if not error <= limits[2]:
                 continue
             same = -1
@@ -562,44 +531,7 @@ def positions(
             elif count < 4:
                 for k in range(3):
                     q[n, count, k] = x[i, k]
-                residual[n, count], marks[n, count] = error, free[i]
                 # two solutions in one: an isolated singular configuration
-                if free[i] == 0 and abs(det) <= MERGE * size**turning:
-                    marks[n, count] = 8
+                double = free[i] == 0 and abs(det) <= MERGE * size**turning
+                residual[n, count], marks[n, count] = error, 8 if double else free[i]
                 count += 1
-
-
-_POSITIONS = NOTHING(INTS, STACK, MATRIX, MATRIX, VECTOR, SCRATCH, types.Tuple((OUT3, OUT2, MARKS)))
-
-
-@compiled(_POSITIONS)
-def position_solutions(
-    kinds: Ints,
-    D: Floats,
-    points: Floats,
-    references: Floats,
-    limits: Floats,
-    work: Scratch,
-    out: tuple[Floats, Floats, Ints],
-) -> None:
-    """Configurations of three revolute joints that bring the tool's origin to points of R_0.
-
-    Shapes: D (4, 4, 4); points, references (N, 3) -> q (N, 4, 3); residual, marks (N, 4).
-    """
-    # limits: length of the arm, relative overshoot of a double root, largest error. marks stay
-    # negative in rows without a solution; bits 1, 2, 4: joints at their reference, 8: double root
-    positions(kinds, D, points, references, limits, work, out, None)
-
-
-@compiled(_POSITIONS)
-def position_solutions_with_slides(
-    kinds: Ints,
-    D: Floats,
-    points: Floats,
-    references: Floats,
-    limits: Floats,
-    work: Scratch,
-    out: tuple[Floats, Floats, Ints],
-) -> None:
-    """The same for joints of any kind."""
-    positions(kinds, D, points, references, limits, work, out, 0)
