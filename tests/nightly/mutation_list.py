@@ -655,7 +655,7 @@ MUTATIONS = [
         "angle_between(h0, h1, p[0], p[1])", "angle_between(p[0], p[1], h0, h1)",
         "tests/test_igm_position.py -k general"),
     Mutation("igm: position", "a double root is counted once, as a simple one",
-        "def positions(", "free[i] == 0 and abs(det)", "free[i] == 9 and abs(det)",
+        "def position_solutions(", "free[i] == 0 and abs(det)", "free[i] == 9 and abs(det)",
         "tests/test_igm_position.py -k double"),
     Mutation("igm: quartic", "a sign in the half-angle quartic", "def trigonometric_roots(",
         "2.0 * h2 - 4.0 * h4", "2.0 * h2 + 4.0 * h4", "tests/test_igm_position.py -k general"),

@@ -116,7 +116,7 @@ def value(a: Floats, i: int, u: float, v: float) -> float:
     return a[i, 0] + u * a[i, 1] + v * a[i, 2]
 
 
-@compiled(counted=False)
+@compiled(counted=False, inlined=True)
 def roots_of_product(work: Scratch, turning: bool, slack: float) -> int:
     """Roots of ``work.g``, a product of two functions of the last joint."""
     if turning:

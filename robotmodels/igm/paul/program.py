@@ -75,13 +75,16 @@ class Program:
         return q, residual, marks
 
 
+_Term = tuple[float, int, int]
+"""A number times two nodes."""
+
+
 class _Registers:
-    """Registers given to nodes, and the operations that fill them."""
+    """Registers of nodes, the levels at which they are known, and the operations that fill them."""
 
     def __init__(self, graph: Graph) -> None:
         self.graph = graph
-        self.of: dict[int, int] = {ONE: 0}
-        self.level: dict[int, int] = {ONE: -1}
+        self.of: dict[int, tuple[int, int]] = {ONE: (0, -1)}  # register and level
         self.initial: list[float] = [1.0]
         self.operations: list[tuple[int, tuple[int, ...], tuple[float, float]]] = []
         self._scaled: dict[Expression, int] = {}
@@ -89,62 +92,40 @@ class _Registers:
     def trial(self) -> _Registers:
         """A copy whose operations count from here."""
         other = _Registers(self.graph)
-        other.of, other.level = dict(self.of), dict(self.level)
-        other._scaled = dict(self._scaled)
+        other.of, other._scaled = dict(self.of), dict(self._scaled)
         return other
 
     def new(self, value: float = 0.0) -> int:
+        """One more register."""
         self.initial.append(value)
         return len(self.initial) - 1
 
-    def give(self, e: Expression, level: int, register: int) -> None:
-        self.of[e[1]], self.level[e[1]] = register, level
-
-    def add(self, level: int, where: tuple[int, ...], numbers: tuple[float, float]) -> None:
-        self.operations.append((level, where, numbers))
-
-    def expression(self, e: Expression) -> tuple[int, int]:
-        """Register and level of an expression."""
-        if e[0] == 0.0:
-            return self.constant(0.0), -1
-        self.node(e[1])
+    def expression(self, e: Expression) -> int:
+        """Register of an expression."""
+        register, level = self.node(e[1])
         if e[0] == 1.0:
-            return self.of[e[1]], self.level[e[1]]
-        if e[1] == ONE:
-            return self.constant(e[0]), -1
+            return register
         if e not in self._scaled:
-            self._scaled[e] = self.new()
-            self.add(self.level[e[1]], (self._scaled[e], self.of[e[1]], 0, 0, 0), (e[0], 0.0))
-        return self._scaled[e], self.level[e[1]]
-
-    def constant(self, value: float) -> int:
-        e = (value, -1)
-        if e not in self._scaled:
-            self._scaled[e] = self.new(value)
+            self._scaled[e] = to = self.new(e[0] if e[1] == ONE else 0.0)
+            if e[1] != ONE:
+                self.operations.append((level, (to, register, 0, 0, 0), (e[0], 0.0)))
         return self._scaled[e]
 
-    def node(self, number: int) -> None:
-        """Make sure that a node has a register."""
-        if number in self.of:
-            return
+    def node(self, number: int) -> tuple[int, int]:
+        """Register and level of a node."""
         node, graph = self.graph.nodes[number], self.graph
-        if graph.is_constant((1.0, number)):
-            self.give((1.0, number), -1, self.new(float(node.values[0])))
-            return
-        if node.kind is Kind.NAMED:
-            register, level = self.expression(node.parts[0])
-            self.give((1.0, number), level, register)
-            return
-        if node.kind is Kind.PRODUCT:
-            a, b = self._factors(number)
-            self._emit(number, [(1.0, a, b)])
-            return
-        terms = []
-        for factor, child in node.parts:
-            a, b = self._factors(child)
-            terms.append((factor, a, b))
-        terms.sort(key=lambda t: max(self.level[t[1]], self.level[t[2]]))
-        self._emit(number, terms)
+        if number in self.of:
+            pass
+        elif graph.is_constant((1.0, number)):
+            self.of[number] = self.new(float(node.values[0])), -1
+        elif node.kind is Kind.NAMED:
+            meaning = node.parts[0]
+            self.of[number] = self.expression(meaning), self.of[meaning[1]][1]
+        elif node.kind is Kind.PRODUCT:
+            self._emit(number, [(1.0, *self._factors(number))])
+        else:
+            self._emit(number, [(f, *self._factors(n)) for f, n in node.parts])
+        return self.of[number]
 
     def _factors(self, number: int) -> tuple[int, int]:
         """A node as a product of two nodes that have registers."""
@@ -155,37 +136,33 @@ class _Registers:
         parts = [n for _, n in node.parts]
         for n in parts:
             self.node(n)
-        if len(parts) > 2:
-            # what is known first is multiplied first
-            parts.sort(key=lambda n: self.level[n])
-            early = self.graph.product(*((1.0, n) for n in parts[:-1]))
-            self.node(early[1])
-            return early[1], parts[-1]
-        return parts[0], parts[1]
+        if len(parts) == 2:
+            return parts[0], parts[1]
+        # what is known first is multiplied first
+        parts.sort(key=lambda n: self.of[n][1])
+        early = self.graph.product(*((1.0, n) for n in parts[:-1]))
+        self.node(early[1])
+        return early[1], parts[-1]
 
-    def _emit(self, number: int, terms: list[tuple[float, int, int]]) -> None:
-        level = max(self.level[n] for _, a, b in terms for n in (a, b))
+    def _level(self, term: _Term) -> int:
+        return max(self.of[n][1] for n in term[1:])
+
+    def _emit(self, number: int, terms: list[_Term]) -> None:
+        """Add terms, two in an operation, those known first before the others."""
+        terms = sorted(terms, key=self._level)
         while len(terms) > 2:
-            one, two = terms[0], terms[1]
-            own = max(self.level[n] for _, a, b in (one, two) for n in (a, b))
-            register = self.new()
-            self._operation(own, register, one, two)
             # a register without a node of its own
-            name = -2 - register
-            self.of[name], self.level[name] = register, own
-            terms = sorted(
-                [(1.0, name, ONE), *terms[2:]],
-                key=lambda t: max(self.level[t[1]], self.level[t[2]]),
-            )
-        register = self.new()
-        self._operation(level, register, terms[0], terms[1] if len(terms) > 1 else None)
-        self.give((1.0, number), level, register)
+            name = -2 - len(self.initial)
+            self._operation(name, terms[:2])
+            terms = sorted([(1.0, name, ONE), *terms[2:]], key=self._level)
+        self._operation(number, terms)
 
-    def _operation(self, level: int, to: int, one: tuple[float, int, int],
-                   two: tuple[float, int, int] | None) -> None:  # fmt: skip
-        f, a, b = one
-        g, c, e = two if two is not None else (0.0, ONE, ONE)
-        self.add(level, (to, self.of[a], self.of[b], self.of[c], self.of[e]), (f, g))
+    def _operation(self, name: int, terms: list[_Term]) -> None:
+        level, register = max(map(self._level, terms)), self.new()
+        (f, a, b), (g, c, e), *_ = *terms, (0.0, ONE, ONE)
+        where = (register, *(self.of[n][0] for n in (a, b, c, e)))
+        self.operations.append((level, where, (f, g)))
+        self.of[name] = register, level
 
 
 def compile_plan(arm: Arm, steps: Sequence[Step]) -> Program:
@@ -195,7 +172,7 @@ def compile_plan(arm: Arm, steps: Sequence[Step]) -> Program:
     for j in range(4):
         for i in range(3):
             e = arm.U0.R[i][j] if j < 3 else arm.U0.p[i]
-            table.give(e, 0, table.new())
+            table.of[e[1]] = table.new(), 0
     rows = np.zeros((len(steps), layout.STEP), dtype=np.int64)
     references: list[Array] = []
     values: dict[int, Expression] = {}
@@ -206,12 +183,12 @@ def compile_plan(arm: Arm, steps: Sequence[Step]) -> Program:
             rows[n, layout.REFERENCE + m] = len(references)
             references.append(_reference(arm, number))
         for m, e in enumerate(step.type.arguments(*step.coefficients)):
-            rows[n, layout.COEFFICIENTS + m] = table.expression(e)[0]
-    results = [table.expression(_joint_value(arm, j, values))[0] for j in range(form.k)]
+            rows[n, layout.COEFFICIENTS + m] = table.expression(e)
+    results = [table.expression(_joint_value(arm, j, values)) for j in range(form.k)]
     reached = np.cumprod([1, *(step.type.branches for step in steps)])
     exact = [_as_is(arm, j) for j in range(form.k)]
     checks = (_check(arm, exact, s, table, reached) for s in range(form.k + 1))
-    results += [table.expression(e)[0] for e in min(checks, key=lambda check: check[0])[1]]
+    results += [table.expression(e) for e in min(checks, key=lambda check: check[0])[1]]
     operations = sorted(table.operations, key=lambda operation: max(operation[0], 0))
     levels = [max(level, 0) for level, _, _ in operations]
     starts = np.searchsorted(np.array(levels, np.int64), np.arange(len(steps) + 2))
@@ -236,18 +213,14 @@ def compile_plan(arm: Arm, steps: Sequence[Step]) -> Program:
 
 def _unknown(arm: Arm, number: int, table: _Registers, level: int) -> tuple[Expression, int]:
     """Registers for value, cosine and sine of an unknown; its value, and the first of them."""
-    item, register = arm.joints.unknowns[number], table.new()
-    table.new()
-    table.new()
-    C, S = arm.joints.symbols(number)
-    if item.slides:
-        table.give(C, level, register)
-        return C, register
-    samples = arm.joints.samples(number)
-    value = arm.graph.symbol(Kind.JOINT, f"value of unknown {number}", "", samples)
-    for i, e in enumerate((value, C, S)):
-        table.give(e, level, register + i)
-    return value, register
+    register, (C, S) = [table.new() for _ in range(3)], arm.joints.symbols(number)
+    value, symbols = C, (C,)
+    if not arm.joints.unknowns[number].slides:
+        samples = arm.joints.samples(number)
+        value = arm.graph.symbol(Kind.JOINT, f"value of unknown {number}", "", samples)
+        symbols = value, C, S
+    table.of |= {e[1]: (r, level) for e, r in zip(symbols, register, strict=False)}
+    return value, register[0]
 
 
 def _scale(step: Step, graph: Graph) -> float:
@@ -265,17 +238,11 @@ def _reference(arm: Arm, number: int) -> Array:
 
 def _joint_value(arm: Arm, j: int, values: dict[int, Expression]) -> Expression:
     """The variable of a joint from the values that the steps give."""
-    joints = arm.joints
-    row = arm.form.rows[j]
-    offset = (-row.offset, ONE)
-    if row.sigma:
-        return arm.graph.sum((joints.lengths[j], offset))
-    sense = joints.group[j][2]
-    terms = []
-    for solved, sign in joints.path(joints.sum_of(j)):
-        factor, node = values[solved.unknown]
-        terms.append((sense * sign * joints.sense(solved.span) * factor, node))
-    return arm.graph.sum((*terms, offset))
+    joints, row = arm.joints, arm.form.rows[j]
+    terms = [joints.lengths[j]] if row.sigma else [
+        (sign * values[u][0], values[u][1]) for sign, u in joints.parts_of(j)
+    ]  # fmt: skip
+    return arm.graph.sum((*terms, (-row.offset, ONE)))
 
 
 def _as_is(arm: Arm, j: int) -> Fixed:

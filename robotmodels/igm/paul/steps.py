@@ -142,16 +142,11 @@ class PlanText:
         for j, row in enumerate(self.plan.form.rows):
             if row.sigma or j not in self.plan.solved:
                 continue
-            path = self.joints.path(self.joints.sum_of(j))
-            if len(path) < 2 or max(order[s.unknown] for s, _ in path) != number:
-                continue
-            sense, terms = self.joints.group[j][2], []
-            for solved, sign in path:
-                name = self.unknown(solved.unknown)
-                sign *= sense * self.joints.sense(solved.span)
-                terms.append((sign, f"({name})" if " " in name else name))
-            words = _added(sorted(terms, key=lambda term: -term[0]))
-            lines.append(f"{self.variable(j)} = {words}")
+            parts = sorted(self.joints.parts_of(j), key=lambda part: -part[0])
+            if len(parts) > 1 and max(order[u] for _, u in parts) == number:
+                names = ((sign, self.unknown(u)) for sign, u in parts)
+                words = _added((sign, f"({n})" if " " in n else n) for sign, n in names)
+                lines.append(f"{self.variable(j)} = {words}")
         return lines
 
     def _undetermined(self, step: Step) -> str:

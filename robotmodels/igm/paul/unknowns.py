@@ -102,10 +102,6 @@ class Joints:
         group, place, _ = self.group[j]
         return JointSum(group, place, place + 1)
 
-    def frame(self, j: int) -> int:
-        """Number of a joint's frame in the table."""
-        return self.form.rows[j].frame
-
     def row(self, j: int) -> Row:
         """Constants of a joint."""
         return self.form.rows[j]
@@ -118,29 +114,23 @@ class Joints:
         out = ""
         for j, sign in terms:
             minus = ("-" if latex else "m") if sign < 0 else ""
-            out += (minus or (between if out else "")) + str(self.frame(j))
+            out += (minus or (between if out else "")) + str(self.row(j).frame)
         return out
 
     def unknown(self, key: JointSum | int) -> int:
         """Number of the unknown of a span (a < b) or of a sliding joint."""
         if key not in self._numbers:
-            if isinstance(key, JointSum):
-                terms = self.terms(key)
-                letters = self._letters(terms)
-                item = Unknown(key, terms, False, letters, self._letters(terms, latex=True))
-            else:
-                name = str(self.frame(key))
-                item = Unknown(None, ((key, 1.0),), True, name, name)
+            span = key if isinstance(key, JointSum) else None
+            terms = self.terms(key) if isinstance(key, JointSum) else ((key, 1.0),)
+            letters = self._letters(terms), self._letters(terms, latex=True)
             self._numbers[key] = len(self.unknowns)
-            self.unknowns.append(item)
+            self.unknowns.append(Unknown(span, terms, span is None, *letters))
         return self._numbers[key]
 
     def samples(self, number: int) -> Array:
         """Values of an unknown at the sample postures."""
-        values = np.zeros(self.graph.samples)
-        for j, sign in self.unknowns[number].terms:
-            values += sign * self.postures[:, j]
-        return values
+        terms = self.unknowns[number].terms
+        return np.sum([sign * self.postures[:, j] for j, sign in terms], axis=0)
 
     def symbols(self, number: int) -> CosSin:
         """Symbols of the cosine and sine of an angle, or of a length (with 0)."""
@@ -187,6 +177,16 @@ class Joints:
                         waiting.append(end)
         return seen[span.b]
 
+    def parts_of(self, j: int) -> list[tuple[float, int]]:
+        """Unknowns that add up to the angle of a joint that is known, with their signs."""
+        sense, path = self.group[j][2], self.path(self.sum_of(j))
+        return [(sense * sign * self.sense(s.span), s.unknown) for s, sign in path]
+
+    def _added(self, a: CosSin, b: CosSin) -> CosSin:
+        """Cosine and sine of the sum of two angles."""
+        (C1, S1), (C2, S2), dot = a, b, self.graph.dot
+        return dot((C1, C2), (negative(S1), S2)), dot((S1, C2), (C1, S2))
+
     def _known(self, span: JointSum) -> CosSin:
         """Cosine and sine of ``Phi_b - Phi_a``, which is known, in the sense of the group."""
         if span.a == span.b:
@@ -194,16 +194,10 @@ class Joints:
         if span.a > span.b:
             C, S = self._known(JointSum(span.group, span.b, span.a))
             return C, negative(S)
-        sense, sums, products = self.sense(span), self.graph.sum, self.graph.product
-        C, S = UNIT, ZERO
-        path = self.path(span)
+        sense, path, (C, S) = self.sense(span), self.path(span), (UNIT, ZERO)
         for solved, sign in path:
-            sign *= self.sense(solved.span)
-            c, s = solved.cos, (sign * solved.sin[0], solved.sin[1])
-            C, S = (
-                sums((products(C, c), negative(products(S, s)))),
-                sums((products(S, c), products(C, s))),
-            )
+            sine = (sign * self.sense(solved.span) * solved.sin[0], solved.sin[1])
+            C, S = self._added((C, S), (solved.cos, sine))
         if len(path) > 1:
             terms = self.terms(span)
             letters, latex = self._letters(terms), self._letters(terms, latex=True)
@@ -229,11 +223,8 @@ class Joints:
         c: Polynomial = {(cosine(number),): UNIT}
         s: Polynomial = {(sine(number),): (turn, ONE)}
         # the rest, Phi_b - Phi_rb + Phi_ra - Phi_a, is known
-        g, products = self.graph, self.graph.product
-        C1, S1 = self._known(JointSum(span.group, rb, span.b))
-        C2, S2 = self._known(JointSum(span.group, span.a, ra))
-        C = g.sum((products(C1, C2), negative(products(S1, S2))))
-        S = g.sum((products(S1, C2), products(C1, S2)))
+        behind, before = JointSum(span.group, rb, span.b), JointSum(span.group, span.a, ra)
+        g, (C, S) = self.graph, self._added(self._known(behind), self._known(before))
         total = plus(g, scaled(g, C, s), scaled(g, S, c))
         return plus(g, scaled(g, C, c), scaled(g, negative(S), s)), scaled(g, (sign, ONE), total)
 
