@@ -209,10 +209,10 @@ def solutions_of_eigenvalues(
 ) -> None:
     """Follow eigenvalues back to configurations, polish them and keep those not found before.
 
-    ``form``: kinds, joints, direction, swapped; ``out``: solutions, counts and report (N, 2), which
-    receives the number of real eigenvalues, pairs that are nearly real included, and the largest
-    distance by which polishing moved the solution of a real one [rad].
+    ``form``: kinds, joints, direction, swapped; ``out``: solutions, counts and report (N, 2).
     """
+    # the report receives the number of real eigenvalues, nearly real pairs included, and the
+    # largest distance by which polishing moved the solution of a real one [rad]
     (kinds, joints, direction, swapped), (found, count, report) = form, out
     P, Q, order, angle, _ = parts
     kind_nu = kinds[4] if swapped else kinds[3]
