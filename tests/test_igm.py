@@ -13,8 +13,6 @@ from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
 from robotmodels.igm.solutions import posture_distance
 
 ORACLES = Path(__file__).parent / "oracles"
-PERIODIC = np.ones(6, bool)
-TINY = (0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
 
 
 def random_q(model, count, seed=0):
@@ -68,16 +66,18 @@ def test_the_oracles_complete_sets(name):
             assert np.nanmin(distance(model, found.q[i], np.array(q))) < 1e-6
 
 
-@pytest.mark.parametrize("name", ["rx90", "tx40", "puma560", "stanford_arm", "ur5e", "kr6_r900"])
+@pytest.mark.parametrize("name", ["rx90", "stanford_arm", "erd:ur10", "erd:centauro_left_arm"])
 def test_every_posture_and_the_one_it_came_from(name):
-    model = rm.load(name)
+    Z, E = (rm.se3.from_rpy(x[:3], x[3:]) for x in np.random.default_rng(11).normal(size=(2, 6)))
+    model, moved = rm.load(name), name.startswith("erd:")
+    model = model.with_base(Z).with_tool(E) if moved else model
     q = random_q(model, 200)
     T = rm.dgm(model, q)
-    found = checked(model, T, rm.igm(model, T, q))
+    found = checked(model, T, rm.igm(model, T, q), residual=2e-12 if moved else 1e-12)
     assert np.all(found.count % 2 == 0)
     # ordered by distance to the reference: the posture itself comes first
     away = distance(model, found.q, q[:, None])
-    assert away[:, 0].max() < 1e-8
+    assert away[:, 0].max() < (1e-6 if moved else 1e-8)
     assert np.all(np.diff(away, axis=1)[found.valid[:, 1:]] >= 0)
     for i in range(0, 200, 40):
         single = rm.igm(model, T[i], q[i])
@@ -104,37 +104,6 @@ def test_branches_keep_their_label_along_a_path(name):
         assert all(len(set(row)) == len(row) for row in found.code[:, : found.count[0]])
 
 
-@pytest.mark.sampled(8)
-@pytest.mark.parametrize("eps", TINY)
-@pytest.mark.parametrize("name", ["rx90", "puma560", "ur5e"])
-def test_no_branch_is_lost_at_a_singular_wrist(name, eps):
-    model = rm.load(name)
-    q = random_q(model, 400, 5)
-    q[:, 4] = 1.0
-    # singular at the wrist only
-    q = q[np.linalg.svd(rm.jacobian(model, q), compute_uv=False)[:, -1] > 0.05][:60]
-    q[:, 4] = eps * np.where(np.arange(60) % 2, 1, -1) + np.pi * (np.arange(60) % 3 == 0)
-    T = rm.dgm(model, q)
-    found = checked(model, T, rm.igm(model, T, q))
-    # a pose with its sixteen digits says no more about the joints than this
-    assert distance(model, found.q[:, 0], q).max() < (1e-9 if eps == 0 else 1e-8 + 3e-14 / eps)
-    if eps == 0.0:
-        free = 3 if name != "ur5e" else 1
-        moving = [3, 5] if name != "ur5e" else [1, 2, 3, 5]
-        assert np.all(found.status == rm.IGMStatus.REACHED_FAMILY)
-        assert np.all(found.free_joints[:, 0, free])
-        assert np.all(found.free_joints[:, 0].sum(axis=-1) == 1)
-        moves = found.free_joints[:, 0] | found.family_joints[:, 0]
-        assert np.all(moves == np.isin(np.arange(6), moving))
-        # without a reference the free joint is zero
-        zero = rm.igm(model, T[0])
-        rows = zero.free_joints.any(axis=-1)
-        assert rows.any()
-        if name != "ur5e":
-            np.testing.assert_allclose(zero.q[zero.free_joints], 0.0, atol=1e-12)
-        assert "infinite family" in zero.reason()
-
-
 @pytest.mark.nightly
 def test_the_three_singular_positions_of_the_rx90():
     """Section 1.2.3, notes on singular positions: shoulder, wrist, elbow, and combinations."""
@@ -144,27 +113,22 @@ def test_the_three_singular_positions_of_the_rx90():
     q[:, 4] += 0.3 * np.sign(q[:, 4])
     shoulder = q.copy()
     shoulder[:, 1] = 0.5 * (0.5 * np.pi - q[:, 2])  # S23 RL4 = C2 D3 with D3 = RL4
-    found = rm.igm(model, rm.dgm(model, shoulder), shoulder)
-    assert np.all(found.free_joints[:, 0, 0])
-    assert distance(model, found.q[:, 0], shoulder).max() < 1e-6
-    both = shoulder.copy()
+    both, elbow, folded = shoulder.copy(), q.copy(), q.copy()
     both[:, 4] = 0.0
-    found = rm.igm(model, rm.dgm(model, both), both)
-    assert distance(model, found.q[:, 0], both).max() < 1e-6
-    # two curves of postures cross there: one turns the wrist alone, the other the shoulder
-    assert np.all(found.free_joints[:, 0, 3])
-    assert np.all(np.any(found.free_joints[:, :, 0], axis=1))
-    elbow = q.copy()
     elbow[:, 2] = -0.5 * np.pi  # C3 = 0, stretched
-    found = rm.igm(model, rm.dgm(model, elbow), elbow)
-    assert distance(model, found.q[:, 0], elbow).max() < 1e-6
-    assert np.all(found.double[:, 0])
-    assert np.all(found.status == rm.IGMStatus.REACHED)
-    assert np.nanmax(found.residual) <= 1e-12
-    elbow[:, 2] = 0.5 * np.pi  # C3 = 0, folded: O_4 is in O_1, about which the arm turns freely
-    found = rm.igm(model, rm.dgm(model, elbow), elbow)
-    assert np.all(found.status == rm.IGMStatus.REACHED_FAMILY)
-    assert distance(model, found.q[:, 0], elbow).max() < 1e-6
+    folded[:, 2] = 0.5 * np.pi  # C3 = 0, folded: O_4 is in O_1, about which the arm turns freely
+    results = []
+    for q in (shoulder, both, elbow, folded):
+        results.append(rm.igm(model, rm.dgm(model, q), q))
+        assert distance(model, results[-1].q[:, 0], q).max() < 1e-6
+    assert np.all(results[0].free_joints[:, 0, 0])
+    # two curves of postures cross there: one turns the wrist alone, the other the shoulder
+    assert np.all(results[1].free_joints[:, 0, 3])
+    assert np.all(np.any(results[1].free_joints[:, :, 0], axis=1))
+    assert np.all(results[2].double[:, 0])
+    assert np.all(results[2].status == rm.IGMStatus.REACHED)
+    assert np.nanmax(results[2].residual) <= 1e-12
+    assert np.all(results[3].status == rm.IGMStatus.REACHED_FAMILY)
 
 
 def test_batches_single_poses_and_nothing():
@@ -254,18 +218,6 @@ def test_why_a_pose_has_no_posture():
     assert rm.igm(handed, turned).status == rm.IGMStatus.ORIENTATION_NOT_AVAILABLE
 
 
-def test_other_bases_tools_and_signs():
-    rng = np.random.default_rng(11)
-    for name in ("erd:ur10", "erd:kinova", "erd:centauro_left_arm"):
-        model = rm.load(name)
-        Z, E = (rm.dgm(rm.load("rx90"), rng.uniform(-3, 3, 6)) for _ in range(2))
-        model = model.with_base(Z).with_tool(E)
-        q = random_q(model, 50)
-        T = rm.dgm(model, q)
-        found = checked(model, T, rm.igm(model, T, q), residual=2e-12)
-        assert distance(model, found.q[:, 0], q).max() < 1e-6
-
-
 @pytest.mark.parametrize(
     ("change", "error", "words"),
     [
@@ -304,27 +256,15 @@ def test_mistakes_are_named(change, error, words):
         rm.igm(**given)
 
 
-def test_redundant_arms_by_lock_arm_angle_and_relations():
+def test_arm_angles_are_an_axis_behind_the_poses_and_joints_are_locked_by_name():
     model = rm.load("iiwa14")
     q = np.random.default_rng(4).uniform(-1.5, 1.5, (20, 7))
-    T = rm.dgm(model, q)
-    # the arm angle of the reference: the posture itself is among the eight
-    found = checked(model, T, rm.igm(model, T, q))
-    assert distance(model, found.q[:, 0], q).max() < 1e-9
-    assert np.all(found.count == 8)
-    assert np.all(found.status == rm.IGMStatus.REACHED_FAMILY)
-    assert not found.free_joints.any()
-    moves = [True, True, True, False, True, True, True]
-    assert np.all(found.family_joints[:, 0] == moves)
-    # angles as an axis behind the poses
-    by_angle = checked(
-        model, np.repeat(T[:, None], 3, axis=1), rm.igm(model, T, arm_angle=[-0.5, 0.0, 2.0])
-    )
+    T, angles = rm.dgm(model, q), [-0.5, 0.0, 2.0]
+    by_angle = rm.igm(model, T, arm_angle=angles)
+    checked(model, np.repeat(T[:, None], 3, axis=1), by_angle)
     assert by_angle.q.shape == (20, 3, 8, 7)
     assert np.all(by_angle.status == rm.IGMStatus.REACHED)
-    one = rm.igm(model, T, arm_angle=2.0)
-    np.testing.assert_allclose(one.q, by_angle.q[:, 2], atol=1e-12)
-    # each joint that moves with the elbow may be locked, by column or by name
+    np.testing.assert_allclose(rm.igm(model, T, arm_angle=2.0).q, by_angle.q[:, 2], atol=1e-12)
     for column in (0, 2, 4, 6):
         for name in (column, str(model.table.names[model.table.joint_rows[column]])):
             locked = rm.igm(model, T[0], q[0], lock={name: q[0, column]})
@@ -332,16 +272,10 @@ def test_redundant_arms_by_lock_arm_angle_and_relations():
             np.testing.assert_allclose(locked.q[:, column], q[0, column], atol=1e-12)
             assert locked.status == rm.IGMStatus.REACHED
             assert not locked.free_joints.any()
-    A = np.zeros((1, 7))
-    A[0, [0, 2]] = 1.0, -2.0
-    related = rm.igm(model, T[0], q[0], relations=(A, A @ q[0]))
-    assert distance(model, related.q[0], q[0]) < 1e-8
-    away = np.remainder(related.q @ A[0] - A[0] @ q[0] + np.pi, 2 * np.pi) - np.pi
-    assert np.abs(away).max() < 1e-9
 
 
-def test_masks_through_the_one_call():
-    """The exercise's poses A and B, pointing with five components, and a point for six joints."""
+def test_poses_and_positions_of_the_exercise():
+    """The exercise's poses A and B."""
     trr = rm.load("lab_trr")
     A = [[0, 0, -1, 0.1414], [0, 1, 0, -0.3], [1, 0, 0, 0.8414], [0, 0, 0, 1]]
     B = [[-1, 0, 0, 0.4], [0, 1, 0, 0.2], [0, 0, -1, 0.5], [0, 0, 0, 1]]
@@ -357,23 +291,6 @@ def test_masks_through_the_one_call():
     path = rm.trajectories.cartesian_trajectory(np.array(A, float), np.array(B, float), 50)
     along = rm.igm(trr, path, mask=point)
     assert np.all(along.status == rm.IGMStatus.REACHED)
-    five = rm.load("xarm5")
-    q = np.random.default_rng(2).uniform(-1.5, 1.5, (10, 5))
-    T = rm.dgm(five, q)
-    # the tool may turn about its axis
-    turned = T.copy()
-    turned[:, :3, :2] = np.stack([T[:, :3, 1], -T[:, :3, 0]], axis=-1)
-    pointed = rm.igm(five, turned, q, mask=[1, 1, 1, 1, 1, 0], mask_axes="tool")
-    assert np.all(pointed.count > 0)
-    again = rm.dgm(five, pointed.q[:, 0])
-    np.testing.assert_allclose(again[:, :3, 2:], T[:, :3, 2:], atol=1e-9)
-    rx90 = rm.load("rx90")
-    q = random_q(rx90, 5, 6)
-    T = rm.dgm(rx90, q)
-    placed = rm.igm(rx90, T, q, mask=point)
-    assert np.all(placed.status == rm.IGMStatus.REACHED_FAMILY)
-    assert distance(rx90, placed.q[:, 0], q).max() < 1e-6
-    assert np.all(placed.free_joints[:, 0].sum(axis=-1) == 3)
 
 
 def test_a_family_whose_curve_does_not_close():
