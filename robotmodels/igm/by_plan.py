@@ -118,7 +118,20 @@ def _(solver: ByPlan, U: Array, references: Array, tolerances: Tolerances) -> Po
         there = np.arange(q.shape[1]) < marks[:, :1]
         return q, there, free_joints(plan, marks[:, 2 : 2 + q.shape[1]], there)
 
-    return solve_singular(chain, candidates, U, references, tolerances)
+    found = solve_singular(chain, candidates, U, references, tolerances)
+    lost = np.flatnonzero(~found.valid.any(axis=1))
+    if chain.k == 6 or lost.size == 0:
+        return found
+    # what one equation leaves free another one determines: virtual joints find its value
+    lost = lost[is_degenerate(solver, U[lost], references[lost])]
+    rest = np.ascontiguousarray(U[lost]), references[lost]
+    return found.put(lost, postures(solver.family, *rest, tolerances))
+
+
+def is_degenerate(solver: ByPlan, U: Array, references: Array) -> NDArray[np.bool_]:
+    """Poses at which an equation of the plan leaves its unknown free, or nearly so, (N,)."""
+    numbers = solver.program.numbers
+    return run(solver.plan, numbers, np.ascontiguousarray(U), references)[2][:, 1] != 0
 
 
 def free_joints(

@@ -16,7 +16,7 @@ from .arrange import PlanRows, Rows, arranged, put, result_fields
 from .branches import branches
 from .chain import far_along_rails
 from .constraints import Components, constraints
-from .families import may_miss_solutions
+from .families import may_be_reached, may_miss_solutions
 from .known import KnownArm, known_arm, solver_for
 from .loop import JointChain
 from .paul.layout import GIVEN, NEEDS_CHECK, WITHIN_LIMITS
@@ -216,7 +216,7 @@ def _by_solver(request: Request, poses: Array, references: Array, psi: Array | N
     if at.size == 0:
         return rows
     # others of a family, or those that were missed, may lie within the limits
-    thorough = solved[at] | (solver is None)
+    thorough = solved[at] | may_be_reached(solver, U[at], own[at])
     search = diagnose(
         request.model, task, thorough, U[at], references[at], limits, request.tolerances
     )

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from .._arrays import Array
 from .arm_angle import prepare_arm_angle
+from .by_plan import ByPlan, is_degenerate
 from .chain import without_locked
-from .closed_form import prepare_closed_form
+from .closed_form import ClosedForm, prepare_closed_form
 from .constraints import WHOLE, Components, Constraints, constraints
 from .elimination import prepare_elimination
 from .loop import JointChain
@@ -80,6 +81,16 @@ def may_miss_solutions(
     # a search found the nearest value of the joint
     d = difference(solver.chain.sigma, found.q, references[:, None])[..., joint]
     return out | np.any(found.free[..., joint] & (np.abs(d) > 1e-9), axis=1)
+
+
+def may_be_reached(solver: Solver | None, U: Array, references: Array) -> NDArray[np.bool_]:
+    """Poses without solution of which the method does not prove that they are out of reach, (N,).
+
+    A joint that an equation leaves free takes its reference, at which another one may have no root.
+    """
+    if isinstance(solver, ByPlan):
+        return is_degenerate(solver, U, references)
+    return np.full(len(U), solver is None or isinstance(solver, (ClosedForm, FewerJoints)))
 
 
 def _searches(solver: Solver) -> bool:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from .._arrays import Array
 from ..model import RobotModel
 from .chain import without_locked
+from .check import checked
 from .constraints import Components
 from .loop import joint_chain
 from .pose_search import Outcome, SearchTask, pose_search, search_space
@@ -20,6 +21,8 @@ REASON = (4, 60)
 THOROUGH = (100, 40)
 """The same where no other solver serves the arm."""
 SEED = 20
+NEAR = 1e-5
+"""Error up to which a closest posture says nothing of the reach: it is refined [m, rad]."""
 
 
 def diagnose(
@@ -53,6 +56,15 @@ def diagnose(
             found = pose_search(space, search, U[rows], q[at], True)
             q[at], family[at], error[rows] = found.q, found.family, found.error
             residual[rows], met[rows], status[rows] = found.residual, found.valid, found.status
+    near = np.flatnonzero(thorough & ~met & (residual < NEAR))
+    if near.size and not limits and task == Task(locks=task.locks):
+        # beside a singular posture the error falls with the square of the distance
+        candidates, there = q[np.ix_(near, columns)][:, None], np.ones((near.size, 1), np.bool_)
+        found = checked(chain, U[near], candidates, there, tolerances, rough=np.inf)
+        hit, row = near[found.valid[:, 0]], found.valid[:, 0]
+        q[np.ix_(hit, columns)], residual[hit] = found.q[row, 0], found.residual[row, 0]
+        met[hit], error[hit], status[near] = True, 0.0, IGMStatus.NOT_CONVERGED
+        status[hit] = IGMStatus.REACHED
     no_reason = status == IGMStatus.OUTSIDE_LIMITS
     if task.relations or task.by_arm_angle:
         no_reason |= met
