@@ -157,17 +157,18 @@ def test_the_own_timing_of_a_path_is_dropped():
 
 
 def test_reversed_and_scaled_paths():
-    model, torque = planar(), np.array([120.0, 40.0])
-    path = PATHS["spline"]
+    model, torque, path, k = planar(), np.array([120.0, 40.0]), PATHS["spline"], 1.7
     back = tr.cubic_spline(VIA[::-1], [0, 1, 2], ends="natural")
     there = [time_optimal(p, FREE, model, torque, both_ends=True).duration for p in (path, back)]
     assert there[0] == pytest.approx(there[1], rel=1e-9)
-    k = 1.7
-    limits = [MotionLimits(velocity=[v * k**i, 9.0]) for i, v in enumerate((1.5, 1.5))]
-    limits = [MotionLimits(velocity=1.5 * k**i, acceleration=30.0 * k ** (2 * i)) for i in (0, 1)]
     one, two = (
-        time_optimal(path, limit, planar(9.81 * k ** (2 * i)), torque * k ** (2 * i)).duration
-        for i, limit in enumerate(limits)
+        time_optimal(
+            path,
+            MotionLimits(velocity=1.5 * f, acceleration=30.0 * f**2),
+            planar(9.81 * f**2),
+            torque * f**2,
+        ).duration
+        for f in (1.0, k)
     )
     assert one == pytest.approx(k * two, rel=1e-9)
 
@@ -187,6 +188,11 @@ def test_friction_takes_the_sign_of_the_motion_and_grows_with_the_speed():
         share = (np.abs(rm.idm(model, at.q, at.v, at.a)) / torque).max(axis=1)
         assert share.max() <= 1.0 + 1e-4
         assert np.median(share) >= 1.0 - 1e-4
+    slow, limit = line([0.0, 0.0], [1.0, 1e-5]), [120.0, 40.0]  # the second joint hardly moves
+    models = (planar(Fc=[0.0, 20.0]), planar(offset=[0.0, 20.0]), plain)
+    durations = [time_optimal(slow, FREE, m, limit).duration for m in models]
+    assert durations[0] == pytest.approx(durations[1], rel=1e-9)
+    assert durations[0] > durations[2] * 1.001
     without = time_optimal(path, FREE, dry, torque, friction=False).duration
     assert without == pytest.approx(time_optimal(path, FREE, plain, torque).duration, rel=1e-12)
     own = CoulombFriction([10.0, 4.0]) + ViscousFriction([8.0, 5.0])
@@ -196,20 +202,12 @@ def test_friction_takes_the_sign_of_the_motion_and_grows_with_the_speed():
     )
 
 
-def test_dry_friction_acts_on_joints_however_slow():
-    path, torque = line([0.0, 0.0], [1.0, 1e-5]), [120.0, 40.0]
-    dry, constant = planar(Fc=[0.0, 20.0]), planar(offset=[0.0, 20.0])
-    durations = [time_optimal(path, FREE, m, torque).duration for m in (dry, constant, planar())]
-    assert durations[0] == pytest.approx(durations[1], rel=1e-9)
-    assert durations[0] > durations[2] * 1.001
-
-
 def test_rates_at_the_ends():
-    limits = MotionLimits(velocity=2.0, acceleration=3.0)
-    timed = time_optimal(line([0.0], [1.0]), limits, start_rate=0.8, end_rate=0.5)
+    limits, path = MotionLimits(velocity=2.0, acceleration=3.0), line([0.0], [1.0])
+    timed = time_optimal(path, limits, start_rate=0.8, end_rate=0.5)
     assert timed.trajectory.v([0.0, timed.duration])[:, 0] == pytest.approx([0.8, 0.5])
     for end in ("start_rate", "end_rate"):
-        slow = time_optimal(line([0.0], [1.0]), limits, **{end: 3.0})
+        slow = time_optimal(path, limits, **{end: 3.0})
         assert slow.status is TimingStatus.NOT_CONTROLLABLE
         assert f"{end} 3 " in slow.reason()
 
@@ -293,26 +291,25 @@ def test_a_path_of_poses_needs_the_robot():
 
 
 @pytest.mark.parametrize(
-    ("change", "error", "word"),
+    ("word", "change"),
     [
-        ({"limits": MotionLimits()}, InvalidValueError, "infinite"),
-        ({"limits": MotionLimits(velocity=[np.inf, 1.0]), "path": line([0, 0], [1, 0])},
-         InvalidValueError, "nothing limits"),
-        ({"limits": MotionLimits(1.0, 1.0, upper=0.2)}, InvalidValueError, "outside its limits"),
-        ({"path": np.zeros((3, 2))}, InvalidValueError, "cubic_spline"),
-        ({"path": line([0, 0], [0, 0])}, InvalidValueError, "no length"),
-        ({"torque": 5.0}, InvalidValueError, "model"),
-        ({"model": planar(), "torque": [-1.0, 1.0]}, InvalidValueError, "torque"),
-        ({"model": planar(), "torque": [1.0, 1.0, 1.0]}, ShapeError, "torque"),
-        ({"model": rm.load("rx90")}, ShapeError, "6 joints"),
-        ({"model": planar(), "torque": 9e2, "torque_rate": 0.0}, InvalidValueError, "above zero"),
-        ({"start_rate": -1.0}, InvalidValueError, "start_rate"),
-        ({"friction": "dry", "model": planar(), "torque": 9e2}, InvalidValueError, "friction"),
+        ("infinite", {"limits": MotionLimits()}),
+        ("nothing limits", {"limits": MotionLimits([np.inf, 1.0]), "path": line([0, 0], [1, 0])}),
+        ("outside its limits", {"limits": MotionLimits(1.0, 1.0, upper=0.2)}),
+        ("cubic_spline", {"path": np.zeros((3, 2))}),
+        ("no length", {"path": line([0, 0], [0, 0])}),
+        ("model", {"torque": 5.0}),
+        ("torque", {"model": planar(), "torque": [-1.0, 1.0]}),
+        ("torque", {"model": planar(), "torque": [1.0, 1.0, 1.0]}),
+        ("6 joints", {"model": rm.load("rx90")}),
+        ("above zero", {"model": planar(), "torque": 9e2, "torque_rate": 0.0}),
+        ("start_rate", {"start_rate": -1.0}),
+        ("friction", {"friction": "dry", "model": planar(), "torque": 9e2}),
     ],
-)  # fmt: skip
-def test_refused_input(change, error, word):
+)
+def test_refused_input(word, change):
     given = {"path": PATHS["line"], "limits": MotionLimits(1.0, 1.0)} | change
-    with pytest.raises(error, match=word):
+    with pytest.raises((InvalidValueError, ShapeError), match=word):
         time_optimal(**given)
 
 
@@ -330,13 +327,13 @@ def test_a_motion_of_functions():
     assert given.scalar
     assert given.check(MotionLimits(velocity=1.0, acceleration=1.0)).kept
     assert not motion.check(MotionLimits(velocity=1.0)).kept
-    for arguments, error, words in (
-        ((lambda t: np.zeros((2, 2)), 1.0), ShapeError, "q"),
-        ((lambda t: np.where(t > 0.4, np.nan, t), 1.0), InvalidValueError, "finite"),
-        ((np.sin, 1.0, None, np.cos), InvalidValueError, "functions"),
-        ((np.sin, 0.0), InvalidValueError, "duration"),
+    for words, *arguments in (
+        ("q", lambda t: np.zeros((2, 2)), 1.0),
+        ("finite", lambda t: np.where(t > 0.4, np.nan, t), 1.0),
+        ("functions", np.sin, 1.0, None, np.cos),
+        ("duration", np.sin, 0.0),
     ):
-        with pytest.raises(error, match=words):
+        with pytest.raises((ShapeError, InvalidValueError), match=words):
             tr.Trajectory.from_functions(*arguments)
 
 
