@@ -44,7 +44,6 @@ from .pose_trajectory import (
     FixedAxisPath,
     PoseTrajectory,
     arc,
-    axis_and_angle,
     rotation_about,
 )
 from .trajectory import Trajectory
@@ -70,8 +69,8 @@ def cartesian_trajectory(
 
     Also called ``ctraj`` (`TimeLaw.LINEAR`: ``trinterp``). The position moves on a line, the
     orientation turns about one fixed axis by the shorter way (slerp), both by the same law, by
-    default a trapezoid of velocity whose ramps take a third of the time each. Leading axes of the
-    poses broadcast. Returns N poses (..., N, 4, 4), both ends included; a single one is ``T0``.
+    default a trapezoid of velocity whose ramps take a third of the time each. Returns N poses
+    (N, 4, 4), both ends included; a single one is ``T0``.
 
     Examples
     --------
@@ -80,27 +79,11 @@ def cartesian_trajectory(
     >>> T.shape, bool((T[0] == np.eye(4)).all())
     ((50, 4, 4), True)
     """
-    first, last = se3.as_pose(T0, "T0"), se3.as_pose(T1, "T1")
-    law, N = chosen(TimeLaw, law, "law"), as_count(N, "N", 0)
-    try:
-        batch = np.broadcast_shapes(first.shape[:-2], last.shape[:-2])
-    except ValueError:
-        raise ShapeError(
-            f"The leading (batch) axes do not broadcast: T0 {first.shape}, T1 {last.shape}."
-        ) from None
-    s = along_line(law, 0.0, 1.0, 1.0, None).q(np.linspace(0.0, 1.0, N))  # part of the way
-    first, last = (np.broadcast_to(T, (*batch, 4, 4))[..., None, :, :] for T in (first, last))
-    R0 = first[..., :3, :3]
-    # the turn seen in the world's axes
-    axis, angle = axis_and_angle(rotation_vectors_of(last[..., :3, :3] @ np.swapaxes(R0, -1, -2)))
-    T = np.zeros((*batch, N, 4, 4))
-    T[..., :3, :3] = rotation_about(axis, angle * s) @ R0
-    T[..., :3, 3] = first[..., :3, 3] + s[:, None] * (last[..., :3, 3] - first[..., :3, 3])
-    T[..., 3, 3] = 1.0
-    if N:
-        T[..., -1:, :, :] = last
-        T[..., :1, :, :] = first
-    return T
+    path = arc(se3.as_single_pose(T0, "T0"), se3.as_single_pose(T1, "T1"))
+    along = along_line(law, 0.0, 1.0, 1.0, None)
+    s = along.q(np.linspace(0.0, 1.0, as_count(N, "N", 0)))
+    s[1:][-1:] = 1.0  # the last pose is met to the last digit
+    return path.poses(s)
 
 
 def straight_line(

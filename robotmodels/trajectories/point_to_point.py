@@ -33,6 +33,8 @@ Book section 4.2; Khalil and Dombre, Modeling, identification and control of rob
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from enum import Enum
 
 import numpy as np
@@ -47,11 +49,10 @@ from .limits import (
     checked_request,
     joint_vectors,
     limits_along,
-    refuse_jointless,
     refuse_short,
 )
 from .motions import PiecewisePolynomial
-from .splines import between_states, motion_between
+from .splines import motion_between
 from .trajectory import Samples, Trajectory
 
 
@@ -65,39 +66,51 @@ class Synchronisation(Enum):
     INDEPENDENT = "the start only: each joint arrives as soon as it can and waits"
 
 
-def linear(
+def along_line(
+    law: TimeLaw | str,
     q0: ArrayLike,
     q1: ArrayLike,
-    duration: float | None = None,
-    limits: MotionLimits | None = None,
+    duration: float | None,
+    limits: MotionLimits | None,
     synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
-    """Constant velocity; it jumps at both ends, so that no acceleration limit holds there."""
-    return along_line(TimeLaw.LINEAR, q0, q1, duration, limits, synchronisation)
+    """Motion from rest to rest by any law, for programs that choose it."""
+    law = chosen(TimeLaw, law, "law")
+    how = chosen(Synchronisation, synchronisation, "synchronisation")
+    return law_motion(law, *joint_vectors(q0=q0, q1=q1), duration, limits, how)
 
 
-def bang_bang(
-    q0: ArrayLike,
-    q1: ArrayLike,
-    duration: float | None = None,
-    limits: MotionLimits | None = None,
-    synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
-) -> Trajectory:
+def _by(law: TimeLaw, text: str) -> Callable[..., Trajectory]:
+    """The function of one law, explained by the text."""
+
+    def move(
+        q0: ArrayLike,
+        q1: ArrayLike,
+        duration: float | None = None,
+        limits: MotionLimits | None = None,
+        synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
+    ) -> Trajectory:
+        return along_line(law, q0, q1, duration, limits, synchronisation)
+
+    move.__doc__, move.__name__ = text, law.name.lower()
+    move.__qualname__ = move.__name__
+    return move
+
+
+linear = _by(
+    TimeLaw.LINEAR,
+    "Constant velocity; it jumps at both ends, so that no acceleration limit holds there.",
+)
+bang_bang = _by(
+    TimeLaw.BANG_BANG,
     """Constant acceleration, then constant deceleration, without a cruise between them.
 
     With asymmetric limits the two parts share the time so that both accelerations are used in
     full; without limits they are equal.
-    """
-    return along_line(TimeLaw.BANG_BANG, q0, q1, duration, limits, synchronisation)
-
-
-def trapezoidal(
-    q0: ArrayLike,
-    q1: ArrayLike,
-    duration: float | None = None,
-    limits: MotionLimits | None = None,
-    synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
-) -> Trajectory:
+    """,
+)
+trapezoidal = _by(
+    TimeLaw.TRAPEZOIDAL,
     """Trapezoidal velocity: the quickest motion under limits of velocity and acceleration.
 
     Also called linear segment with parabolic blends, ``lspb``. Without limits the ramps take a
@@ -109,23 +122,16 @@ def trapezoidal(
     >>> move = trapezoidal([0.0, 0.0], [1.0, -1.0], limits=limits)
     >>> move.duration, move.v(0.75)
     (1.50..., array([ 1., -1.]))
-    """
-    return along_line(TimeLaw.TRAPEZOIDAL, q0, q1, duration, limits, synchronisation)
-
-
-def smoothed_trapezoidal(
-    q0: ArrayLike,
-    q1: ArrayLike,
-    duration: float | None = None,
-    limits: MotionLimits | None = None,
-    synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
-) -> Trajectory:
+    """,
+)
+smoothed_trapezoidal = _by(
+    TimeLaw.SMOOTHED_TRAPEZOIDAL,
     """Smoothed trapezoidal velocity: ramps whose acceleration is a parabola of time.
 
     The acceleration is continuous, also at the ends. A ramp to the velocity V takes
     ``1.5 V / acceleration``, or longer where a limit of jerk needs it.
-    """
-    return along_line(TimeLaw.SMOOTHED_TRAPEZOIDAL, q0, q1, duration, limits, synchronisation)
+    """,
+)
 
 
 def cubic(
@@ -188,17 +194,17 @@ def joint_trajectory(
 
     Parameters
     ----------
-    q0, q1 : array_like, shape (..., n)
+    q0, q1 : array_like, shape () or (n,)
         First and last postures, rad or m.
     N : int or array_like, shape (N,)
         How many samples, equally spaced over one second; or their times, s, ascending.
-    v0, v1 : array_like, shape () or (..., n)
+    v0, v1 : array_like, shape () or (n,)
         Velocities at the ends, rad/s or m/s.
 
     Returns
     -------
     Samples
-        ``t (N,)`` and ``q, v, a, jerk (..., N, n)``; as an array its positions.
+        ``t (N,)`` and ``q, v, a, jerk (N, n)``; as an array its positions.
 
     Examples
     --------
@@ -212,31 +218,10 @@ def joint_trajectory(
         t = as_floats(N, "N")  # type: ignore[arg-type]
         if t.ndim != 1 or (t[1:] < t[:-1]).any():
             raise InvalidValueError("N: expected a number of samples or times that ascend.")
-    times = t - t[0] if t.size else t
-    ends = [as_floats(x, name) for x, name in ((q0, "q0"), (q1, "q1"), (v0, "v0"), (v1, "v1"))]
-    shape = np.broadcast_shapes(*(x.shape for x in ends))
-    # polynomials of one duration: joints of all rows side by side
-    rows = [np.broadcast_to(x, shape).reshape(-1) for x in ends]
-    T, names = float(times.max(initial=0.0)) or 1.0, ("q0", "q1", "v0", "v1")
-    refuse_jointless(shape[-1] if shape else 1, "q0 and q1")
-    states = dict(zip(names, rows, strict=True)) | {"a0": np.zeros(1), "a1": np.zeros(1)}
-    motion = PiecewisePolynomial(np.array([[0.0, T]]), between_states(5, states, T)[None])
-    values = (x.reshape(t.size, *shape) for x in motion.derivatives(times, (0, 1, 2, 3)))
-    return Samples(t, *(np.moveaxis(x, 0, max(len(shape) - 1, 0)) for x in values))
-
-
-def along_line(
-    law: TimeLaw | str,
-    q0: ArrayLike,
-    q1: ArrayLike,
-    duration: float | None,
-    limits: MotionLimits | None,
-    synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
-) -> Trajectory:
-    """Motion from rest to rest by any law, for programs that choose it."""
-    law = chosen(TimeLaw, law, "law")
-    how = chosen(Synchronisation, synchronisation, "synchronisation")
-    return law_motion(law, *joint_vectors(q0=q0, q1=q1), duration, limits, how)
+    if not t.size or t[0] == t[-1]:
+        return quintic(q0, q1, 1.0, None, v0, v1).at(0.0 * t)
+    samples = quintic(q0, q1, float(t[-1] - t[0]), None, v0, v1).at(t - t[0])
+    return replace(samples, t=t)
 
 
 def law_motion(

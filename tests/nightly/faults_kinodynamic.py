@@ -33,7 +33,7 @@ MUTATIONS = [
     Mutation(ROOM, "half of gravity is held", "def not_held(",
              "- np.abs(load)", "- 0.5 * np.abs(load)", PATH + "gravity_beyond"),
     Mutation(ROOM, "slow joints have no dry friction", "def direction(self",
-             "_ROUNDING *", "2e-5 *", PATH + "dry_friction"),
+             "_ROUNDING *", "2e-5 *", PATH + "friction_takes"),
     Mutation(ROOM, "narrower limits of intervals have no effect", "bounds = (self.lower + narrow",
              "self.upper - narrow[1]", "self.upper + 0.0 * narrow[1]", PATH + "held_between"),
     Mutation(ROOM, "rates of torques without the change of the middle", "at_ends = ends @",
