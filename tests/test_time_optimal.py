@@ -65,6 +65,15 @@ def used(model, motion, torque, samples=10_001):
     return (np.abs(rm.idm(model, at.q, at.v, at.a)) / torque).max(axis=1)
 
 
+@pytest.mark.parametrize(("points", "most"), [(60, 2e-3), (200, 4e-4)])
+def test_velocities_are_kept_between_the_points(points, most, rng):
+    for n in (3, 6):
+        limits = MotionLimits(rng.uniform(0.5, 2.0, n), rng.uniform(5.0, 20.0, n))
+        timed = time_optimal(spline(rng, n), limits, points=points)
+        v = timed.trajectory.v(np.linspace(0.0, timed.duration, 20_001))
+        assert (np.abs(v) / limits.velocity).max() <= 1.0 + most
+
+
 PATHS = {
     "spline": tr.cubic_spline(VIA, [0, 1, 2], ends="natural"),
     "not_a_knot": tr.cubic_spline([*VIA, [0.2, 0.1]], [0, 1, 2, 3], ends="not_a_knot"),

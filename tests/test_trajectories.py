@@ -195,7 +195,6 @@ def test_motions_that_stay_or_hardly_move():
         stay, wait = (make([1.0, 2.0], [1.0, 2.0], T, limits) for T in (None, 5.0))
         assert np.array_equal(stay.q([-1.0, 0.0, 1.0]), [[1.0, 2.0]] * 3)
         assert (stay.duration, wait.duration) == (0.0, 5.0)
-        assert not wait.v([0.0, 2.0, 5.0]).any()
         assert np.isfinite(make([0.0, 0.0], [1e-300, -1e-305], limits=limits).q(0.0)).all()
     # zero limits of joints that stay do not matter
     move = trapezoidal([0.0, 1.0], [1.0, 1.0], limits=MotionLimits([1.0, 0.0], [1.0, 0.0]))

@@ -369,10 +369,8 @@ def test_projections_are_the_widths_of_the_ellipsoid():
 # ---------------------------------------------------------------- mistakes
 
 T3 = np.broadcast_to(np.eye(4), (3, 4, 4))
-BATCH = tr.joint_trajectory(np.zeros((2, 3)), np.ones((2, 3)), 5)
 MAP_1, MAP_2 = (simulation.dynamics_map(SCARA, joints) for joints in (1, (1, 2)))
 MISTAKES = (
-    (lambda: viz.plot_trajectory(BATCH), "samples of one motion"),
     (lambda: viz.plot_trajectory(LINE), "trajectory: expected a Trajectory.*got PoseTrajectory"),
     (lambda: viz.plot_trajectory(MOVE, orders=(0, 4)), "orders: .* from 0 to 3, each once"),
     (lambda: viz.plot_trajectory(MOVE, tr.MotionLimits([1.0, 2.0])), "limits of 3 joints"),

@@ -195,11 +195,14 @@ class PathLimits:
             if self.drives is not None or self.friction:
                 steady = gravity + self.drag(q, SLOWEST * self.direction(rate))
             a[:, k:], b[:, k:], c[:, k:] = inertial[:, load], moving[:, load], steady[:, load]
+        scale = self.scale
+        return Rows(a / scale, b / scale, c / scale, self.top(rate), still / scale)
+
+    def top(self, rate: Array) -> Array:
+        """Greatest squared rates (N,) that the limits of velocity allow. Shapes: rate (N, n)."""
         with np.errstate(divide="ignore"):
             most = np.where(rate > 0.0, self.limits.velocity, -self.limits.velocity_lower)
-            top = (most / np.abs(rate)).min(axis=1) ** 2
-        scale = self.scale
-        return Rows(a / scale, b / scale, c / scale, np.minimum(top, 1e300), still / scale)
+            return np.minimum((most / np.abs(rate)).min(axis=1) ** 2, 1e300)
 
     def direction(self, rate: Array) -> Array:
         """The rates, with those that are nothing but rounding made zero."""

@@ -23,6 +23,7 @@ _BETWEEN = 1.02  # largest share of a torque between points that is not reported
 _INSIDE = np.array([0.01, 0.15, 0.3, 0.5, 0.7, 0.85, 0.99])  # of the time of an interval
 _BESIDE = np.array([-0.02, -0.001, 0.001, 0.02])
 _HELD = 5e-4  # of a torque: greatest excess between points with limits at both ends
+_FASTER = 2e-5  # of a squared rate: greatest excess of velocities between points
 _ROUNDS = 12
 _ROUNDING = 1e-7  # of the duration, divided by the number of intervals: least gap
 
@@ -87,9 +88,9 @@ def time_optimal(
     Accelerations are limited at both ends of every interval of a grid, torques at its start
     (collocation); `TimedPath.reason` lists where torques between the points exceed their limits by
     more than 2 %. With ``both_ends`` they are limited at both ends and, by narrower limits where
-    needed, between them to 1.001, but for moments where dry friction changes its sign. On curved
-    paths velocities and accelerations may exceed their limits between the points by some parts in a
-    thousand, less with more points.
+    needed, between them to 1.001, but for moments where dry friction changes its sign. Velocities
+    are limited between the points too, to some parts in ten thousand; on curved paths accelerations
+    may exceed their limits there by some parts in a thousand, less with more points.
 
     Parameters
     ----------
@@ -164,6 +165,19 @@ def time_optimal(
     gap = problem.passes(s[half], q[half], rate[half], bend[half], ends, coarse).duration
     gap = abs(gap - passes.duration) / passes.duration + _ROUNDING / points
     x = passes.found[:, 0]
+    places = s[:-1, None] + np.diff(s)[:, None] * _INSIDE
+    top = problem.top(motion.derivatives(places.reshape(-1), (1,))[0]).reshape(places.shape)
+    for _ in range(_ROUNDS):
+        # where velocities inside an interval exceed their limits, those at its ends are lower
+        over = ((x[:-1, None] + np.diff(x)[:, None] * _INSIDE) / top).max(axis=1)
+        if not over.max() > 1.0 + _FASTER:
+            break
+        for part, y in ((rows.top[:-1], x[:-1]), (rows.top[1:], x[1:])):
+            np.minimum(part, y / np.maximum(over, 1.0), out=part, where=y > 0.0)
+        then = problem.passes(s, q, rate, bend, ends, rows)
+        if then.failed >= 0 or np.isinf(then.duration):
+            break
+        passes, x = then, then.found[:, 0]
     if not x.max() < 1e200:
         raise InvalidValueError(
             f"limits: nothing limits the motion at s = {s[x.argmax()]:.6g}, so the time would be "

@@ -56,7 +56,7 @@ from ..estimation import confidence_intervals
 from . import style
 from .over_time import Unit
 from .shapes import rounded_down
-from .space import across, fill_cells, space
+from .space import across, space
 from .style import ALERT, DASHED, INK, PAGE, PALE, PALETTE, ZERO, Figure, Look
 
 _SIDES = (
@@ -122,18 +122,13 @@ def plot_calibration_residuals(result: CalibrationResult, **look: Unpack[Look]) 
                 axes.plot(x[outlier], far, label="outlier (at the edge: beyond it)", **_RING)
             axes.set_ylim(-most, most)
             axes.locator_params(axis="y", nbins=5)
-            rms, raised = float(np.sqrt(np.mean(y**2))), bool(outlier.any())
-            axes.set_title(f"rms {rms:.3g} {symbol}", loc="right", pad=5.0 if raised else 2.0)
+            axes.set_title(f"rms {np.sqrt(np.mean(y**2)):.3g} {symbol}", loc="right")
         places[0].set_ylabel(f"{row[0]} ({symbol})")
-    for axes in grid[-1]:
+    for axes in grid.flat:
         axes.set(xlabel="configuration", xlim=(0.0, count + 1.0))
-    for k, part in enumerate(parts if len(parts) > 1 else ()):
-        for axes in grid.flat if k else ():
+        axes.label_outer()
+        for part in parts[1:]:
             axes.axvline(part.blocks[0] + 0.5, color=PALE, linewidth=0.8)
-        name = part.measurement.name
-        if 0.065 * len(name) < 3.0 * len(part.blocks) / count:  # inches
-            place = grid[0, 0].get_xaxis_transform()
-            grid[0, 0].text(part.blocks[0] + 0.7, 0.98, name, transform=place, va="top")
     return style.finished(figure, look, [side[-1] for side in _SIDES])
 
 
@@ -286,11 +281,8 @@ def plot_calibration_in_space(
         )
     if magnification is not None:
         magnification = as_number(magnification, "magnification", above=0.0)
-    rows, title = len(parts), look.get("title")
-    above = 0.02 if title is None else 0.3
-    figure, _ = style.panels(PAGE, above + (3.55 if rows == 1 else 2.3 * rows), look, rows=0)
-    each = (1.0 - above / figure.get_figheight()) / rows
-    cells = []
+    rows = len(parts)
+    figure, _ = style.panels(PAGE, 3.6 if rows == 1 else 2.4 * rows, look, rows=0)
     for row, part in enumerate(parts):
         columns = [part.measurement.axes.index(axis) for axis in "xyz"]
         outlier = part.outlier & ~part.outlier.all()
@@ -304,12 +296,8 @@ def plot_calibration_in_space(
             # outliers count, as in the report
             rms = 1e3 * float(np.sqrt(np.mean(np.sum(error**2, axis=1))))
             name = f"{part.measurement.name:.14}, " if rows > 1 else ""
-            text = f"{name}{side}: rms {rms:.3g} mm, arrows x {scale:g}"
-            cells.append((axes, (0.5 * column, (rows - 1 - row) * each, 0.5, each), text))
-    fill_cells(figure, cells)
-    if title is not None:
-        figure.suptitle(title, y=1.0 - 0.06 / figure.get_figheight(), va="top")
-    return figure
+            axes.set_title(f"{name}{side}: rms {rms:.3g} mm, arrows x {scale:g}")
+    return style.finished(figure, look)
 
 
 def _draw_arrows(
@@ -370,8 +358,7 @@ def plot_selection(
     for axes, unit in zip(others, kinds, strict=True):
         factor, symbol, kind = _UNITS[unit]
         own = factor * selected.standard_errors[:, units == unit]
-        axes.plot(counts, own, color=PALE, linewidth=0.8, alpha=0.8)
-        axes.plot([], [], color=PALE, linewidth=0.8, label="each parameter")
+        axes.plot(counts, own, color=PALE, linewidth=0.8, alpha=0.8, label="each parameter")
         for k, (label, values) in enumerate(
             (("median", np.median(own, axis=1)), ("largest", own.max(axis=1)))
         ):
@@ -381,8 +368,6 @@ def plot_selection(
         axes.set(ylabel=f"expected standard error ({symbol})", title=kind)
     for axes in (first, *others):
         axes.set_xlabel("contacts" if selected.groups.shape[1] > 1 else "configurations")
-        axes.margins(x=0.03)
-        axes.xaxis.get_major_locator().set_params(integer=True, nbins=6)
         if enough is not None:
             axes.axvline(enough, color=INK, zorder=1.5, label=f"enough: {enough}", **DASHED)
     look["title"] = look.get("title") or sentence

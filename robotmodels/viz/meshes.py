@@ -87,16 +87,11 @@ def _read(
 
 def _creased(surface: Any) -> Triangles:
     """Triangles of a surface, cut along its sharp edges: the viewer smooths shared vertices."""
-    from trimesh.graph import connected_component_labels
+    from trimesh.graph import smooth_shade
 
     surface.merge_vertices(merge_norm=True, merge_tex=True)
-    gentle = surface.face_adjacency[surface.face_adjacency_angles < _CREASE]
-    patch = connected_component_labels(gentle, node_count=len(surface.faces))
-    # one vertex for each patch that meets there
-    meeting = np.asarray(surface.faces, dtype=np.int64) + len(surface.vertices) * patch[:, None]
-    unique, faces = np.unique(meeting, return_inverse=True)
-    points = np.asarray(surface.vertices)[unique % len(surface.vertices)]
-    return Triangles(read_only(points, np.float32), read_only(faces.reshape(-1, 3), np.uint32))
+    smooth = smooth_shade(surface, angle=_CREASE, facet_minarea=None)
+    return Triangles(read_only(smooth.vertices, np.float32), read_only(smooth.faces, np.uint32))
 
 
 def _color(geometry: Any) -> Color | None:

@@ -1,4 +1,4 @@
-"""Axes in space with equal scales, that fill their cell of a figure with all of their texts."""
+"""Axes in space with equal scales."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from .style import PALE, Figure
 _ELEVATION, _OBLIQUE = np.radians((24.0, 60.0))
 _OFF_AXIS = np.radians((22.0, 68.0))
 _THINNEST = 0.35  # edge of the box in any direction, beside the longest edge
-_PASSES = 6
 
 
 def across(points: Array) -> Array:
@@ -49,49 +48,6 @@ def space(
         axis.labelpad = 2.0
         axes.tick_params(axis=name, pad=-1.0)
         axes.set(**{f"{name}lim": (middle - 0.5 * edge, middle + 0.5 * edge)})
-    axes.set_box_aspect(edges)
+    axes.set_box_aspect(edges, zoom=0.8)
     axes.patch.set_visible(False)  # it would hide its neighbours
     return axes
-
-
-def fill_cells(figure: Figure, cells: list[tuple[Any, tuple[float, ...], str]]) -> Figure:
-    """Zoom and shift axes in space until each fills its cell, below its heading.
-
-    Cells are (axes, (left, bottom, width, height) in parts of the figure, heading).
-    """
-    figure.set_layout_engine("none")  # it does not know how far texts of axes in space reach
-    size = np.array(figure.bbox.size)
-    pad = 0.05 * figure.dpi
-    places = [(size * cell[:2], size * cell[2:], bool(heading)) for _, cell, heading in cells]
-    edges = [np.ptp([a.get_xlim(), a.get_ylim(), a.get_zlim()], axis=1) for a, _, _ in cells]
-    zoom, shift = np.ones(len(cells)), np.zeros((len(cells), 2))
-    for _ in range(_PASSES):  # texts do not grow with the box
-        for k, (axes, (left, bottom, width, height), _) in enumerate(cells):
-            x, y = shift[k] / size
-            axes.set_position((left + x, bottom + y, width, height))
-            axes.set_box_aspect(edges[k], zoom=zoom[k])
-        figure.draw_without_rendering()
-        for k, (corner, room, headed) in enumerate(places):
-            low, high = _taken(cells[k][0])
-            free = room - (0.0, 0.22 * figure.dpi * headed)
-            fit = float(((free - 2.0 * pad) / (high - low)).min())
-            zoom[k] *= fit
-            shift[k] += fit * (corner + 0.5 * free - 0.5 * (low + high))
-    for axes, (left, bottom, width, height), heading in cells:
-        at = (left + 0.5 * width, bottom + height - 0.05 / figure.get_figheight())
-        figure.text(*at, heading, size=8.5, ha="center", va="top")
-        for artist in axes.get_children():
-            artist.set_clip_on(False)  # the box may stand a little outside of its rectangle
-    return figure
-
-
-def _taken(axes: Any) -> Array:
-    """Least and greatest pixels of the box and of the texts on it, as they were drawn last."""
-    from mpl_toolkits.mplot3d.proj3d import proj_transform
-
-    corners = np.array(np.meshgrid(axes.get_xlim(), axes.get_ylim(), axes.get_zlim()))
-    x, y, _ = proj_transform(*corners.reshape(3, -1), axes.get_proj())  # type: ignore[call-arg]
-    boxes = [axis.get_tightbbox() for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
-    points = [axes.transData.transform(np.column_stack((x, y)))]
-    every = np.concatenate(points + [box.get_points() for box in boxes if box is not None])
-    return np.array((every.min(axis=0), every.max(axis=0)))

@@ -166,14 +166,6 @@ def plain_logarithmic(axis: Any, most: int = 6) -> None:
     axis.set_major_formatter(StrMethodFormatter("{x:g}"))
 
 
-def few_numbers(axis: Any, unit: str) -> None:
-    """Axis with at most six numbers, multiples of 15, 30, 45 or 90 where they are degrees."""
-    from matplotlib.ticker import MaxNLocator
-
-    steps = [1.0, 1.5, 3.0, 4.5, 6.0, 9.0, 10.0] if unit == "deg" else None
-    axis.set_major_locator(MaxNLocator(5, steps=steps))
-
-
 def powers_around_zero(axes: Axes, axis: str, least: float, count: int) -> None:
     """Scale that is linear below ``least``, with about so many powers of ten on either side."""
     from matplotlib.ticker import NullLocator
@@ -207,9 +199,12 @@ def color_map(
 
 def joint_axes(axes: Axes, names: Sequence[str], units: Sequence[Any]) -> None:
     """Two joints on the axes of a map, with their units."""
+    from matplotlib.ticker import MaxNLocator
+
     for axis, name, unit in zip((axes.xaxis, axes.yaxis), names, units, strict=True):
         axis.set_label_text(f"{name} ({unit.value})")
-        few_numbers(axis, unit.value)
+        degrees = [1.0, 1.5, 3.0, 4.5, 6.0, 9.0, 10.0] if unit.value == "deg" else None
+        axis.set_major_locator(MaxNLocator(5, steps=degrees))
 
 
 def correlation_figure(C: Array, names: Sequence[str], look: Look) -> Figure:

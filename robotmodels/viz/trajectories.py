@@ -57,7 +57,7 @@ from ..trajectories.pose_trajectory import PoseSamples, PoseTrajectory
 from ..trajectories.trajectory import Samples, Trajectory
 from . import over_time, style
 from .over_time import Sampled, Unit
-from .space import across, fill_cells, space
+from .space import across, space
 from .style import COLUMN, INK, PAGE, PALETTE, Axes, Figure, Look
 
 _EVENTS: dict[PathEventKind, tuple[str, Any, str]] = {
@@ -245,7 +245,7 @@ def plot_pose_path(
     angles = across(points) if view is None else as_exact(view, (2,), "view")
     some = np.unique(np.linspace(0, len(T) - 1, count).round().astype(int))
     tips = points[some, None] + arm * np.swapaxes(T[some, :3, :3], 1, 2)
-    figure, _ = style.panels(COLUMN, 0.92 * COLUMN, look, rows=0)
+    figure, _ = style.panels(COLUMN, 1.05 * COLUMN, look, rows=0)
     every = np.concatenate((points, tips.reshape(-1, 3)))
     axes = space(figure, (1, 1, 1), every, length, angles)
     axes.plot(*points.T, color=INK, label="path")
@@ -260,10 +260,7 @@ def plot_pose_path(
         run = points[event.first : event.last + 1]
         axes.plot(*run.T, color=color, linewidth=4.0, alpha=0.45, label=f"_{text}")
         axes.plot(*run[[0, -1]].T, marker, color=color, markersize=4.5, label=text)
-    style.finished(figure, look)
-    figure.draw_without_rendering()
-    top = min(legend.get_window_extent().y0 for legend in figure.legends)
-    return fill_cells(figure, [(axes, (0.0, 0.0, 1.0, top / figure.bbox.height), "")])
+    return style.finished(figure, look)
 
 
 def _poses(poses: Any, path: JointPath | None) -> Array:

@@ -170,20 +170,17 @@ def _method(solution: Any, name: str, N: int) -> tuple[Array, Any, Any, Any]:
 def _set_powers(axes: Any, which: str) -> None:
     """A scale of powers where values differ by more than a decade or two; linear around zero."""
     drawn = [each for each in axes.get_lines() if LIMIT not in str(each.get_label())]
-    data = [np.asarray(getattr(each, f"get_{which}data")(), dtype=float) for each in drawn]
-    values = np.concatenate(data or [np.empty(0)])
-    values = values[np.isfinite(values)]
-    most = float(np.abs(values).max(initial=0.0))
-    some = np.abs(values)[np.abs(values) > _LEAST * most]
-    if not some.size or most < _DECADES * some.min():
+    values = np.concatenate([np.ravel(getattr(each, f"get_{which}data")()) for each in drawn])
+    sizes = np.abs(values[np.isfinite(values)])
+    most = sizes.max(initial=0.0)
+    least = sizes.min(where=sizes > _LEAST * most, initial=np.inf)
+    if most < _DECADES * least:
         return
-    if (values > _LEAST * most).all():
+    if (values > 0.5 * least).all():
         axes.set(**{f"{which}scale": "log"})
         return
-    signed = bool((values < 0.0).any())
-    least = 10.0 ** np.floor(np.log10(float(some.min())))
-    style.powers_around_zero(axes, which, least, 2 if signed else 5)
-    if not signed:
+    style.powers_around_zero(axes, which, 10.0 ** np.floor(np.log10(least)), 3)
+    if not (values < 0.0).any():
         axes.set(**{f"{which}lim": (0.0, 1.5 * most)})
 
 

@@ -45,7 +45,7 @@ from .over_time import Unit, is_prismatic
 from .robot import Options, draw_robot
 from .scene import Scene
 from .shapes import Node, Segments, apply, floor_grid, path_node
-from .space import across, fill_cells, space
+from .space import across, space
 from .style import INK, PAGE, PALE, PALETTE, Figure, Look
 
 _DARK: Color = (0.10, 0.10, 0.10, 1.0)
@@ -92,9 +92,7 @@ def plot_servo(run: ServoMotion, **look: Unpack[Look]) -> Figure:
     for T in run.cameras[[0, -1]]:
         for edge in apply(T, view).reshape(-1, 2, 3):
             axes.plot(*edge.T, color=PALETTE[0], linewidth=0.8)
-    style.finished(figure, look)
-    figure.draw_without_rendering()  # places the other panels
-    return fill_cells(figure, [(axes, (0.5, 0.0, 0.5, 0.46), "")])
+    return style.finished(figure, look)
 
 
 def show_servo(

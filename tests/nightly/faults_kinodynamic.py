@@ -34,6 +34,8 @@ MUTATIONS = [
              "- np.abs(load)", "- 0.5 * np.abs(load)", PATH + "gravity_beyond"),
     Mutation(ROOM, "slow joints have no dry friction", "def direction(self",
              "_ROUNDING *", "2e-5 *", PATH + "friction_takes"),
+    Mutation(ROOM, "velocities between the points are not looked at", "places = s[:-1, None]",
+             "over.max() > 1.0 + _FASTER", "over.max() > 1e9", PATH + "velocities_are_kept"),
     Mutation(ROOM, "narrower limits of intervals have no effect", "bounds = (self.lower + narrow",
              "self.upper - narrow[1]", "self.upper + 0.0 * narrow[1]", PATH + "held_between"),
     Mutation(ROOM, "rates of torques without the change of the middle", "at_ends = ends @",
