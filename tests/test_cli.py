@@ -90,52 +90,88 @@ def test_igm_prints_every_posture(run):
     np.testing.assert_allclose(printed, found.q, atol=5.1e-7)
 
 
-def test_the_three_ways_to_give_a_pose_agree(run):
-    model = rm.load("rx90")
-    T = rm.dgm(model, Q)
-    ways = (
-        ["--q", *np.degrees(Q)],
-        ["--xyz", *T[:3, 3], "--rpy", *np.degrees(se3.to_rpy(T[:3, :3]))],
-        ["--matrix", *T.ravel()],
-    )
-    for way in ways:
-        result = solved(run, "rx90", *way, "--degrees")
-        assert result["units"] == ["deg"] * 6
-        np.testing.assert_allclose(result["pose"], T, atol=1e-15)
-        postures = np.radians([posture["q"] for posture in result["postures"]])
-        np.testing.assert_allclose(rm.dgm(model, postures), np.tile(T, (8, 1, 1)), atol=1e-12)
+def of(name, q, **more):
+    """Arguments of `igm` for the pose that a robot has at q."""
+    return {"T": rm.dgm(rm.load(name), q), "position_tolerance": 1e-9} | more
 
 
-def test_json_holds_what_the_call_returns(run):
-    model, q = rm.load("lab_trr"), [-0.3, -0.7, 1.1]
-    result = solved(run, "lab_trr", "--q", *q, *POINT, "--q-ref", *q)
-    found = rm.igm(model, rm.dgm(model, q), q_ref=q, mask=[1, 1, 1, 0, 0, 0])
-    assert (result["robot"], result["units"]) == ("lab_trr", ["m", "rad", "rad"])
+T = of("rx90", Q)["T"]
+REF, WRIST, SLIDE = [-0.3, -0.7, 1.1], [0.3, 1.0, -1.8, 0.4, 0.0, -0.2], [0.2, 30.0, -45.0]
+SLIDE_RAD = [0.2, *np.radians([30.0, -45.0])]
+SEVEN = np.array([10.0, 30.0, -15.0, -80.0, 20.0, 40.0, 5.0])
+SEVEN_WORDS = ["--q", *SEVEN, "--degrees", "--q-ref", *SEVEN]
+PRINTED = [0, 0, -1, 0.1414, 0, 1, 0, -0.3, 1, 0, 0, 0.8414, 0, 0, 0, 1]  # pose A, four digits
+XYZ = {"mask": [1, 1, 1, 0, 0, 0]}
+LOCKED = of("iiwa14", np.radians(SEVEN), lock={2: np.radians(-15.0)}, q_ref=np.radians(SEVEN))
+SOLVED = {
+    "q": ("rx90", ["--q", *Q], of("rx90", Q)),
+    "matrix": ("rx90", ["--matrix", *T.ravel(), "--degrees"], of("rx90", Q)),
+    "rpy": (
+        "rx90",
+        ["--xyz", *T[:3, 3], "--rpy", *np.degrees(se3.to_rpy(T[:3, :3])), "--degrees"],
+        of("rx90", Q),
+    ),
+    "mask": (
+        "lab_trr",
+        ["--q", *REF, *POINT, "--q-ref", *REF],
+        of("lab_trr", REF, q_ref=REF, **XYZ),
+    ),
+    "word": (
+        "lab_trr",
+        ["--q", *REF, "--mask", "xyz", "--q-ref", *REF],
+        of("lab_trr", REF, q_ref=REF, **XYZ),
+    ),
+    "slides": (
+        "lab_trr",
+        ["--q", *SLIDE, *POINT, "--degrees", "--q-ref", *SLIDE],
+        of("lab_trr", SLIDE_RAD, q_ref=SLIDE_RAD, **XYZ),
+    ),
+    "tolerances": (
+        "lab_trr",
+        ["--matrix", *PRINTED, "--tolerance", "1e-4", "1e-6"],
+        {
+            "T": np.reshape(PRINTED, (4, 4)),
+            "position_tolerance": 1e-4,
+            "orientation_tolerance": 1e-6,
+        },
+    ),
+    "singular": ("rx90", ["--q", *WRIST, "--q-ref", *WRIST], of("rx90", WRIST, q_ref=WRIST)),
+    "limits": ("kr6_r900", ["--q", "zero", "--limits"], of("kr6_r900", np.zeros(6), limits=True)),
+    "tool axes": (
+        "rx90",
+        ["--q", *Q, "--mask", 1, 1, 1, 1, 1, 0, "--mask-axes", "tool"],
+        of("rx90", Q, mask=[1, 1, 1, 1, 1, 0], mask_axes="tool"),
+    ),
+    "arm angle": (
+        "iiwa14",
+        ["--q", *SEVEN, "--degrees", "--arm-angle", -20],
+        of("iiwa14", np.radians(SEVEN), arm_angle=np.radians(-20.0)),
+    ),
+    "lock": ("iiwa14", [*SEVEN_WORDS, "--lock", "3=-15"], LOCKED),
+    "lock by name": ("iiwa14", [*SEVEN_WORDS, "--lock", "joint_3=-15"], LOCKED),
+}
+
+
+@pytest.mark.parametrize("case", SOLVED)
+def test_igm_gives_what_the_call_returns(run, case):
+    name, words, call = SOLVED[case]
+    model, degrees, result = rm.load(name), "--degrees" in words, solved(run, name, *words)
+    found = rm.igm(model, **call)
+    turns, names = model.table.sigma[model.table.joint_rows] == 0, np.array(model.table.joint_names)
+    scale = np.where(turns, 180.0 / np.pi if degrees else 1.0, 1.0)
+    rows, valid = result["postures"], found.valid
+    assert len(rows) > 0
+    np.testing.assert_allclose(result["pose"], call["T"], atol=1e-14)
+    np.testing.assert_allclose([row["q"] for row in rows], found.q[valid] * scale, atol=1e-7)
+    assert result["units"] == np.where(turns, "deg" if degrees else "rad", "m").tolist()
+    for key in ("branch", "within_limits"):
+        assert [row[key] for row in rows] == getattr(found, key)[valid].tolist()
+    free = [names[some].tolist() for some in found.free_joints[valid]]
+    assert [row["free_joints"] for row in rows] == free
     assert (result["reason"], result["method"]) == (found.reason(), found.method)
-    rows = result["postures"]
-    np.testing.assert_allclose([row["q"] for row in rows], found.q, atol=0)
-    assert [row["branch"] for row in rows] == found.branch.tolist()
-    assert solved(run, "lab_trr", "--q", *q, "--mask", "xyz", "--q-ref", *q) == result
-
-
-def test_degrees_leave_slides_in_metres(run):
-    q = [0.2, 30.0, -45.0]
-    result = solved(run, "lab_trr", "--q", *q, *POINT, "--degrees", "--q-ref", *q)
-    assert result["units"] == ["m", "deg", "deg"]
-    np.testing.assert_allclose(result["postures"][0]["q"], q, atol=1e-4)
-
-
-def test_tolerance_for_a_pose_of_four_digits(run):
-    """Pose A of the exercise: reached to its digits, not to 1e-9."""
-    pose = [0, 0, -1, 0.1414, 0, 1, 0, -0.3, 1, 0, 0, 0.8414, 0, 0, 0, 1]
-    code, out, _ = run("igm", "lab_trr", "--matrix", *pose)
-    assert code == 1
-    assert "closest posture: joint_1 -0.3" in out
-    result = solved(run, "lab_trr", "--matrix", *pose, "--tolerance", "1e-4", "--degrees")
-    np.testing.assert_allclose(result["postures"][0]["q"], [-0.3, -45, -45], atol=0.02)
-    # metres, then radians: the position is what has four digits
-    for tolerance, code in ((["1e-4", "1e-6"], 0), (["1e-6", "1e-6"], 1)):
-        assert run("igm", "lab_trr", "--matrix", *pose, "--tolerance", *tolerance)[0] == code
+    text = run("igm", name, *words)[1]
+    assert ("joint_4 took the reference;" in text) == (case == "singular")
+    assert ("asked for: x y z rx ry in tool axes" in text) == (case == "tool axes")
 
 
 def test_a_pose_that_is_not_reached_says_why(run):
@@ -150,48 +186,6 @@ def test_a_pose_that_is_not_reached_says_why(run):
     assert (result["reached"], result["status"], result["postures"]) == (False, "TOO_FAR", [])
     T = rm.dgm(rm.load("rx90"), result["closest"])
     np.testing.assert_allclose(T[:3, 3], [0.9, 0, 0], atol=1e-3)
-
-
-def test_a_singular_pose_names_the_joint_that_took_the_reference(run):
-    q = [0.3, 1.0, -1.8, 0.4, 0.0, -0.2]
-    code, out, _ = run("igm", "rx90", "--q", *q, "--q-ref", *q)
-    assert code == 0
-    assert re.search(r"infinite family through posture 1\b.*: joint_4 took the reference;", out)
-    rows = solved(run, "rx90", "--q", *q, "--q-ref", *q)["postures"]
-    assert rows[0]["free_joints"] == ["joint_4"]
-    np.testing.assert_allclose(rows[0]["q"], q, atol=1e-9)
-
-
-def test_limits_drop_postures_and_a_mask_may_be_in_tool_axes(run, tmp_path):
-    table = rm.load("rx90").table.replace(lower=[-1.0] + [-4.0] * 5, upper=[1.0] + [4.0] * 5)
-    rm.write_urdf(rm.RobotModel.from_table(table, name="arm"), tmp_path / "arm.urdf")
-    words = [tmp_path / "arm.urdf", "--q", *Q]
-    every = solved(run, *words)["postures"]
-    assert sorted(row["within_limits"] for row in every) == [False] * 4 + [True] * 4
-    inside = solved(run, *words, "--limits", "--q-ref", *Q)["postures"]
-    assert [row["within_limits"] for row in inside] == [True] * 4
-    np.testing.assert_allclose(inside[0]["q"], Q, atol=1e-9)
-    pointing = ["rx90", "--q", *Q, "--mask", 1, 1, 1, 1, 1, 0, "--mask-axes", "tool"]
-    result = solved(run, *pointing)  # the turn about the tool's z axis is free
-    for row in result["postures"]:
-        reached = rm.dgm(rm.load("rx90"), row["q"])
-        np.testing.assert_allclose(reached[:3, 2:], np.array(result["pose"])[:3, 2:], atol=1e-7)
-    assert "asked for: x y z rx ry in tool axes" in run("igm", *pointing)[1]
-
-
-def test_seven_joints_by_arm_angle_or_a_locked_joint(run):
-    iiwa = rm.load("iiwa14")
-    q = np.radians([10.0, 30.0, -15.0, -80.0, 20.0, 40.0, 5.0])
-    words = ["iiwa14", "--q", *np.degrees(q), "--degrees"]
-    swung = solved(run, *words, "--arm-angle", -20)
-    wanted = rm.igm(iiwa, rm.dgm(iiwa, q), arm_angle=np.radians(-20.0))
-    found = np.radians([row["q"] for row in swung["postures"]])
-    np.testing.assert_allclose(found, wanted.q, atol=1e-9)
-    for name in ("3", iiwa.table.joint_names[2]):
-        locked = solved(run, *words, "--lock", f"{name}=-15", "--q-ref", *np.degrees(q))
-        rows = np.array([row["q"] for row in locked["postures"]])
-        np.testing.assert_allclose(rows[:, 2], -15.0, atol=1e-12)
-        np.testing.assert_allclose(rows[0], np.degrees(q), atol=1e-6)
 
 
 # --- view and demo --------------------------------------------------------------------------------

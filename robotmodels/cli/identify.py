@@ -103,18 +103,10 @@ def run(arguments: argparse.Namespace) -> Report | ExitStatus:
     choices = given(arguments, "cutoff", "decimation", "edges")
     choices["dead_band"] = joint_numbers(arguments.dead_band, model.n, "--dead-band")
     with workers(arguments.workers) as executor, progress(arguments, "reducing the log") as bar:
-        result = fit(
-            model,
-            log,
-            method_of_options(arguments, model),
-            drive=drive,
-            form=arguments.form,
-            processing=choices,
-            test=test,
-            checked=not arguments.no_check,
-            executor=executor,
-            progress=bar,
-        )
+        method, checked = method_of_options(arguments, model), not arguments.no_check
+        more: dict[str, Any] = {"drive": drive, "form": arguments.form, "test": test}
+        more |= {"processing": choices, "checked": checked}
+        result = fit(model, log, method, executor=executor, progress=bar, **more)
     if result.status is EstimateStatus.UNSTABLE:
         say(text_of(result).rstrip())
         return ExitStatus.NOT_REACHED

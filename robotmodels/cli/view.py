@@ -68,10 +68,9 @@ def run(arguments: argparse.Namespace) -> Report:
 
 def _temporary(name: str) -> Path:
     """A new empty file."""
-    stem = re.sub(r"[^\w.-]", "_", name)
-    handle, path = tempfile.mkstemp(prefix=f"robotmodels_{stem}_", suffix=".html")
-    os.close(handle)
-    return Path(path)
+    stem = "robotmodels_" + re.sub(r"[^\w.-]", "_", name) + "_"
+    with tempfile.NamedTemporaryFile(prefix=stem, suffix=".html", delete=False) as file:
+        return Path(file.name)
 
 
 def _open(path: Path) -> bool:

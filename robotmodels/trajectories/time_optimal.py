@@ -21,6 +21,7 @@ from .trajectory import TimingResult, Trajectory
 
 _BETWEEN = 1.02  # largest share of a torque between points that is not reported
 _INSIDE = np.array([0.01, 0.15, 0.3, 0.5, 0.7, 0.85, 0.99])  # of the time of an interval
+_PLACES = np.linspace(0.1, 0.9, 9)  # in an interval: where velocities are looked at
 _BESIDE = np.array([-0.02, -0.001, 0.001, 0.02])
 _HELD = 5e-4  # of a torque: greatest excess between points with limits at both ends
 _FASTER = 2e-5  # of a squared rate: greatest excess of velocities between points
@@ -165,11 +166,11 @@ def time_optimal(
     gap = problem.passes(s[half], q[half], rate[half], bend[half], ends, coarse).duration
     gap = abs(gap - passes.duration) / passes.duration + _ROUNDING / points
     x = passes.found[:, 0]
-    places = s[:-1, None] + np.diff(s)[:, None] * _INSIDE
+    places = s[:-1, None] + np.diff(s)[:, None] * _PLACES
     top = problem.top(motion.derivatives(places.reshape(-1), (1,))[0]).reshape(places.shape)
     for _ in range(_ROUNDS):
         # where velocities inside an interval exceed their limits, those at its ends are lower
-        over = ((x[:-1, None] + np.diff(x)[:, None] * _INSIDE) / top).max(axis=1)
+        over = ((x[:-1, None] + np.diff(x)[:, None] * _PLACES) / top).max(axis=1)
         if not over.max() > 1.0 + _FASTER:
             break
         for part, y in ((rows.top[:-1], x[:-1]), (rows.top[1:], x[1:])):

@@ -38,7 +38,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import ceil
 from typing import Any, Unpack
 
 import numpy as np
@@ -61,7 +60,6 @@ from .style import Figure, Look
 _COMPONENTS = np.array(["x", "y", "z", "rx", "ry", "rz"])
 _FORCES = np.array(["fx", "fy", "fz", "mx", "my", "mz"])
 _PIECES = 8  # of the shaft of an arrow
-_LETTERS = 58.0  # that fit over a panel
 _ARROW = (0.85, 0.2, 0.1, 1.0)
 _WALL = (0.45, 0.55, 0.7, 0.45)
 
@@ -137,8 +135,7 @@ def _figure(t: Array, panels: Sequence[tuple[str, Array, list[str]]], look: Look
         axes.set_ylabel(label)
         if names not in ([label], shown):  # the same names have the legend of the panel above
             shown, lines = names, axes.get_lines()[-len(names) :]
-            most = int(_LETTERS / (max(map(len, names)) + 9.0))
-            columns = ceil(len(names) / ceil(len(names) / most))
+            columns = min(len(names), 3)
             axes.legend(lines, names, ncols=columns, loc="lower right", bbox_to_anchor=(1, 1))
     return style.finished(figure, look)
 

@@ -53,7 +53,6 @@ _POINTS = 700  # groups of samples of a log that are drawn
 _RESIDUALS = 4000  # residuals that are drawn
 _BODIES = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 _NORMAL = 1.959964  # half the width of a 95 % interval in standard errors
-_IN_A_ROW = 48  # bars
 _MOST = 14.0  # logarithm of the largest condition number that is drawn
 
 
@@ -236,30 +235,22 @@ def plot_identification_standard_errors(
     relative = 100.0 * found.relative_errors
     with np.errstate(divide="ignore", invalid="ignore"):
         white = 100.0 * found.details.iid_standard_errors / np.abs(found.values)
-    order = np.argsort(-relative, kind="stable")
-    rows = max(1, -(-len(order) // _IN_A_ROW))
-    each = -(-len(order) // rows)
-    figure, grid = style.panels(PAGE, 0.7 + 1.8 * rows, look, rows, 1, sharey=True)
+    order, x = np.argsort(-relative, kind="stable"), np.arange(len(relative))
     finite = relative[np.isfinite(relative) & (relative > 0.0)]
     low, high = (float(f(initial=100.0 * WEAK)) for f in (finite.min, finite.max))
     low, high = 0.5 * low, 1.3 * high
-    for row, axes in enumerate(grid[:, 0]):
-        some = order[row * each : (row + 1) * each]
-        x = np.arange(len(some))
-        # a value of zero has an infinite relative standard error: full bar
-        height = np.clip(relative[some], low, high)
-        weak = relative[some] > 100.0 * WEAK
-        for k, (mask, label) in enumerate(((~weak, "determined"), (weak, "poorly determined"))):
-            if mask.any():
-                axes.bar(x[mask], height[mask] - low, 0.7, low, color=PALETTE[k], label=label)
-        axes.hlines(white[some], x - 0.42, x + 0.42, color=INK, label="if residuals were white")
-        axes.axhline(100.0 * WEAK, color=INK, label="_limit", **DASHED)
-        axes.set(yscale="log", ylim=(low, high))
-        style.plain_logarithmic(axes.yaxis)
-        axes.set_xlim(-0.8, each - 0.2)
-        axes.set_xticks(x, [found.names[k] for k in some], rotation=90)
-        axes.grid(False, axis="x")
-        axes.set_ylabel("relative standard error (%)")
+    # a value of zero has an infinite relative standard error: full bar
+    height, weak = np.clip(relative[order], low, high), relative[order] > 100.0 * WEAK
+    figure, ((axes,),) = style.panels(PAGE, 2.5, look)
+    for k, (mask, label) in enumerate(((~weak, "determined"), (weak, "poorly determined"))):
+        if mask.any():
+            axes.bar(x[mask], height[mask] - low, 0.7, low, color=PALETTE[k], label=label)
+    axes.hlines(white[order], x - 0.42, x + 0.42, color=INK, label="if residuals were white")
+    axes.axhline(100.0 * WEAK, color=INK, label="_limit", **DASHED)
+    axes.set(yscale="log", ylim=(low, high), ylabel="relative standard error (%)")
+    style.plain_logarithmic(axes.yaxis)
+    axes.set_xticks(x, [found.names[k] for k in order], rotation=90)
+    axes.grid(False, axis="x")
     return style.finished(figure, look, ("determined", "poorly determined"))
 
 
