@@ -28,7 +28,7 @@ MUTATIONS = [
              " - first)", ")", PATH + "friction"),
     Mutation(ROOM, "rotors do not turn with the curvature", "moving + bend @ rotor",
              "moving + bend @ rotor", "moving", PATH + "friction"),
-    Mutation(ROOM, "velocity limits are not squared", "top = (most / np.abs(rate))",
+    Mutation(ROOM, "velocity limits are not squared", "return np.minimum((most / np.abs(rate))",
              "** 2", "** 1", PATH + "trapezoid"),
     Mutation(ROOM, "half of gravity is held", "def not_held(",
              "- np.abs(load)", "- 0.5 * np.abs(load)", PATH + "gravity_beyond"),
