@@ -54,7 +54,7 @@ def right_angled_robot(rng):
 
 def turned(base):
     """Sum of the angles of the axes that were taken as aligned: a bound of torque errors."""
-    aligned = aligned_robot(base.model, base.angle).model.chain.rotation
+    aligned = aligned_robot(base.model, base.angle)[0].chain.rotation
     return np.linalg.norm(aligned - base.model.chain.rotation, axis=(1, 2)).sum()
 
 

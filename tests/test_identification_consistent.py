@@ -155,7 +155,11 @@ def test_mistakes_are_named(rng, monkeypatch):
         (InvalidValueError, "prior: expected 2 links", {"prior": rm.InertialParameters.zeros(3)}),
         (ShapeError, r"mass_bounds: expected shape \(2, 2\)", {"mass_bounds": [1.0, 2.0]}),
         (InvalidValueError, "mass of link 2", {"mass_bounds": [[0, 1], [2, 1]]}),
-        (InvalidValueError, "no link 3", {"centre_bounds": [CenterOfMassBox(3, [0] * 3, [1] * 3)]}),
+        (
+            InvalidValueError,
+            "links 1 to 2",
+            {"centre_bounds": [CenterOfMassBox(3, [0] * 3, [1] * 3)]},
+        ),
     ):
         given: dict[str, Any] = {"R": R, "y": y, "rest": rest, "prior": prior} | changes
         with pytest.raises(error, match=said):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import reduce
 from math import ceil, copysign, log10
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,15 +23,8 @@ _RANK = 1e-3
 """Rank tolerance of the derivatives of an axis: relative singular value."""
 
 
-class AlignedRobot(NamedTuple):
-    """Robot with aligned axes, and the pairs concerned."""
-
-    model: RobotModel
-    notes: tuple[str, ...]
-
-
-def aligned_robot(model: RobotModel, angle: float) -> AlignedRobot:
-    """Align axes that are nearly parallel or perpendicular by the least rotation."""
+def aligned_robot(model: RobotModel, angle: float) -> tuple[RobotModel, tuple[str, ...]]:
+    """Align axes that are nearly parallel or perpendicular by the least rotation; notes on them."""
     chain, table = model.chain, model.table
     rows = np.stack((table.gamma, table.beta, table.alpha, table.theta))
     pairs = _Pairs(angle)
@@ -45,8 +37,7 @@ def aligned_robot(model: RobotModel, angle: float) -> AlignedRobot:
         around = still[int(chain.antecedent[k])]
         name = f"axis {k + 1}" if sigma != FIXED else f"z of frame {k + 1}"
         known = len(pairs.taken)
-        z = pairs.aligned(name, R[:, 2], around)
-        if z is not None:
+        if (z := pairs.aligned(name, R[:, 2], around)) is not None:
             if not _turn_axis(row, z):  # beta and alpha both near a right angle: no small rotation
                 pairs.apart += pairs.taken[known:]
                 del pairs.taken[known:]
@@ -55,20 +46,18 @@ def aligned_robot(model: RobotModel, angle: float) -> AlignedRobot:
             still.append({name: np.array([0.0, 0.0, 1.0])})
             continue
         for i, letter in enumerate("xy"):  # they decide which first moments are kept
-            x = pairs.aligned(f"{letter} of frame {k + 1}", R[:, i], {**around, name: R[:, 2]})
-            if x is not None:
-                gamma, beta, alpha, _ = row
-                cosine, sine = x @ _rotation(gamma, beta, alpha, 0.5 * np.pi * i)[:, :2]
+            others = {**around, name: R[:, 2]}
+            if (x := pairs.aligned(f"{letter} of frame {k + 1}", R[:, i], others)) is not None:
+                cosine, sine = x @ _rotation(row[0], row[1], row[2], 0.5 * np.pi * i)[:, :2]
                 row[3] = np.arctan2(sine, cosine)
                 R = _rotation(*row)
         if sigma != FIXED:
             around = {**around, name: R[:, 2]}
         still.append({other: e @ R for other, e in around.items()})
-    if not pairs.taken:
-        return AlignedRobot(model, pairs.notes)
-    gamma, beta, alpha, theta = rows
-    table = table.replace(gamma=gamma, beta=beta, alpha=alpha, theta=theta)
-    return AlignedRobot(model.with_table(table), pairs.notes)
+    if pairs.taken:
+        columns = dict(zip(("gamma", "beta", "alpha", "theta"), rows, strict=True))
+        model = model.with_table(table.replace(**columns))
+    return model, pairs.notes
 
 
 @dataclass
@@ -82,17 +71,13 @@ class _Pairs:
     def aligned(self, name: str, u: Array, others: dict[str, Array]) -> Array | None:
         """Nearest unit vector aligned with the others; None if unchanged."""
         turned = False
-        across: list[Array] = []
-        along: list[Array] = []
+        near: dict[str, list[Array]] = {"parallel": [], "perpendicular": []}
         for other, e in others.items():
             cosine, sine = float(u @ e), float(np.linalg.norm(np.cross(u, e)))
-            for word, off, directions in (
-                ("parallel", sine, along),
-                ("perpendicular", abs(cosine), across),
-            ):
+            for word, off in (("parallel", sine), ("perpendicular", abs(cosine))):
                 pair = off, f"{name} and {other} {word} but for {off:.1e} rad"
                 if off <= self.angle:
-                    directions.append(copysign(1.0, cosine) * e)
+                    near[word].append(copysign(1.0, cosine) * e)
                     if off > _ROUNDING:
                         self.taken.append(pair)
                         turned = True
@@ -100,8 +85,9 @@ class _Pairs:
                     self.apart.append(pair)
         if not turned:
             return None
-        if along:
-            return along[0]
+        if near["parallel"]:
+            return near["parallel"][0]
+        across = near["perpendicular"]
         u = u - np.linalg.pinv(across, rcond=_RANK) @ (across @ u)
         return u / np.linalg.norm(u)
 

@@ -102,9 +102,7 @@ def standard_parameters(
         sizes = np.maximum(np.abs(b), 1e-3 * largest_of_kind(base.names, np.abs(b)))
         sizes = np.maximum(sizes, 1e-4 * sizes.max(initial=0.0))  # a kind may hold rounding only
         weights = np.diag(1.0 / np.where(sizes > 0.0, sizes, 1.0))
-    W = as_core(weights, (len(base),), "weights")
-    if W.ndim != 2:
-        raise ShapeError(f"weights: expected shape (k, {len(base)}), got {W.shape}.")
+    W = _rows(weights, base, "weights")
     near, P0, drives = _checked_prior(base, prior, drive_prior, margin)
     squares = Squares(W, base.matrix, b, float(np.abs(b).max(initial=0.0)))
     fit = PhysicalProblem(base, near, P0, b, margin).fit(squares, b, 0.0, TOLERANCE)
@@ -172,12 +170,7 @@ def fit_consistent(
         if not good:
             raise InvalidValueError(f"{name}: expected {expected}, got {value}.")
     near, P0, drives = _checked_prior(base, prior, drive_prior, margin)
-    factor = as_core(R, (len(base),), "R")
-    if factor.ndim != 2:
-        raise ShapeError(
-            f"R: expected shape (r, {len(base)}), a column for each base parameter, got "
-            f"{factor.shape}."
-        )
+    factor = _rows(R, base, "R")
     right = as_exact(y, (len(factor),), "y")
     lengths = np.linalg.norm(factor, axis=0)
     lengths = np.where(lengths > 0.0, lengths, 1.0)
@@ -193,6 +186,14 @@ def fit_consistent(
     )
     fit = problem.fit(squares, best, float(gamma), float(tolerance))
     return StandardParameters(base, best, near, drives, fit, rows)
+
+
+def _rows(matrix: ArrayLike, base: BaseParameters, name: str) -> Array:
+    """Rows (r, b) with a column for each base parameter."""
+    rows = as_core(matrix, (len(base),), name)
+    if rows.ndim != 2:
+        raise ShapeError(f"{name}: expected shape (r, {len(base)}), got {rows.shape}.")
+    return rows
 
 
 def _checked_prior(

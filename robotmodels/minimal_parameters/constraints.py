@@ -2,6 +2,24 @@
 
 Sources: P. Wensing, S. Kim and J.-J. Slotine, IEEE RA-L 3(1), 2018; C. Sousa and R. Cortesao, IJRR
 33(6), 2014.
+
+Parameters
+----------
+link : int
+    Frame number of a link, 1..f.
+low, high : array_like, shape (3,)
+    Corners in frame R_j, metres; infinite where there is no bound, equal where it is known.
+center, semi_axes : array_like, shape (3,)
+    Centre in frame R_j and half lengths, metres.
+rotation : array_like, shape (3, 3), optional
+    Its columns are the directions of the axes in R_j; default the axes of R_j.
+
+Examples
+--------
+>>> CenterOfMassBox(2, [0, -0.1, -0.1], [0.4, 0.1, 0.1]).link
+2
+>>> CenterOfMassEllipsoid(1, [0.1, 0, 0], [0.2, 0.1, 0.1]).semi_axes
+array([0.2, 0.1, 0.1])
 """
 
 from __future__ import annotations
@@ -13,7 +31,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Rebuilt, as_exact, as_reals, read_only
+from .._arrays import Array, Rebuilt, as_each, as_exact, as_reals, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..regressors.columns import standard_blocks
 from .result import BaseParameters
@@ -128,20 +146,7 @@ def drive_constraints(base: BaseParameters, unit: Array) -> Iterator[Constraint]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CenterOfMassBox(Rebuilt):
-    """The centre of mass of a link lies in a box along the axes of its frame.
-
-    Parameters
-    ----------
-    link : int
-        Frame number, 1..f.
-    low, high : array_like, shape (3,)
-        Corners in frame R_j, metres; infinite where there is no bound, equal where it is known.
-
-    Examples
-    --------
-    >>> CenterOfMassBox(2, [0, -0.1, -0.1], [0.4, 0.1, 0.1]).link
-    2
-    """
+    """The centre of mass of a link lies in a box along the axes of its frame."""
 
     link: int
     low: Any
@@ -154,11 +159,10 @@ class CenterOfMassBox(Rebuilt):
             if value.shape != (3,):
                 raise ShapeError(f"{name}: expected shape (3,), got {value.shape}.")
             object.__setattr__(self, name, read_only(value))
-        low, high = self.low, self.high
-        if not ((low < np.inf).all() and (high > -np.inf).all() and (low <= high).all()):
+        if not all(_is_interval(*ends) for ends in zip(self.low, self.high, strict=True)):
             raise InvalidValueError(
-                f"CenterOfMassBox of link {self.link}: low must not be above high, got {low} and "
-                f"{high}; both in metres, in frame R_{self.link}."
+                f"CenterOfMassBox of link {self.link}: low must not be above high, got {self.low} "
+                f"and {self.high}; both in metres, in frame R_{self.link}."
             )
 
     def constraints(self, unit: Array) -> Iterator[Constraint]:
@@ -171,22 +175,7 @@ class CenterOfMassBox(Rebuilt):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CenterOfMassEllipsoid(Rebuilt):
-    """The centre of mass of a link lies in an ellipsoid.
-
-    Parameters
-    ----------
-    link : int
-        Frame number, 1..f.
-    center, semi_axes : array_like, shape (3,)
-        Centre in frame R_j and half lengths, metres.
-    rotation : array_like, shape (3, 3), optional
-        Its columns are the directions of the axes in R_j; default the axes of R_j.
-
-    Examples
-    --------
-    >>> CenterOfMassEllipsoid(1, [0.1, 0, 0], [0.2, 0.1, 0.1]).semi_axes
-    array([0.2, 0.1, 0.1])
-    """
+    """The centre of mass of a link lies in an ellipsoid."""
 
     link: int
     center: Any
@@ -239,15 +228,9 @@ def mass_constraints(
             )
         intervals += [(masses[[j]], *bounds[j], f"mass of link {j + 1}") for j in range(f)]
     if total_mass is not None:
-        total = as_reals(total_mass, "total_mass")
-        if total.shape not in ((), (2,)):
-            raise ShapeError(
-                "total_mass: expected a number, or the least and the greatest in kg, got shape "
-                f"{total.shape}."
-            )
-        intervals.append((masses, *np.broadcast_to(total, (2,)), "total mass of all links"))
+        intervals.append((masses, *as_each(total_mass, 2, "total_mass"), "total mass of all links"))
     for numbers, low, high, name in intervals:
-        if not (low <= high and high > 0.0 and low < np.inf):
+        if not (_is_interval(low, high) and high > 0.0):
             raise InvalidValueError(
                 f"{name}: expected a least value that is not above the greatest, and a positive "
                 f"greatest value, got {low} and {high} kg."
@@ -256,16 +239,17 @@ def mass_constraints(
         row[numbers] = 1.0
         yield from _interval(row, low, high, unit, name)
     for bound in centre_bounds:
-        if not isinstance(bound, CenterOfMassBound):
+        if not (isinstance(bound, CenterOfMassBound) and 1 <= bound.link <= f):
             raise InvalidValueError(
-                "centre_bounds: expected CenterOfMassBox or CenterOfMassEllipsoid, got "
-                f"{type(bound).__name__}."
-            )
-        if not 1 <= bound.link <= f:
-            raise InvalidValueError(
-                f"centre_bounds: there is no link {bound.link}; they are numbered 1 to {f}."
+                "centre_bounds: expected CenterOfMassBox or CenterOfMassEllipsoid of links 1 to "
+                f"{f}, got {bound!r:.80}."
             )
         yield from bound.constraints(unit)
+
+
+def _is_interval(low: float, high: float) -> bool:
+    """Whether there are finite numbers between two, NaN excluded."""
+    return bool(low <= high and low < np.inf and high > -np.inf)
 
 
 def _interval(

@@ -104,15 +104,12 @@ class TorqueColumns:
     def _random_motion(self, units: Array) -> Samples:
         """Random motion with balanced gravity, centrifugal and inertia torques."""
         rng = np.random.default_rng(0)
-        G = np.eye(self.model.n) if self.constraint is None else self.constraint
-        u = G.shape[1]
-        rate = sqrt(EARTH / reach(self.model))
-        N = ceil(_ROWS_A_COLUMN * len(self.names) / max(u, 1))
         # revolute joints turn by any angle, prismatic ones move by the robot's size
-        whole = np.eye(u) * units.max(initial=0.0)
-        spread = np.diag(units) if self.constraint is None else whole
+        spread = np.diag(units) if self.constraint is None else self.constraint.T * units.max()
+        rate = sqrt(EARTH / reach(self.model))
+        N = ceil(_ROWS_A_COLUMN * len(self.names) / max(len(spread), 1))
         q, v, a = (
-            scale * rng.uniform(-1.0, 1.0, (N, u)) @ spread @ G.T
+            scale * rng.uniform(-1.0, 1.0, (N, len(spread))) @ spread
             for scale in (np.pi, rate, rate**2)
         )
         if self.friction is not None:  # half of the samples over all decades: near zero velocity
@@ -127,15 +124,12 @@ class TorqueColumns:
             return basis
         left = np.maximum(np.append(np.sort(basis.distance)[::-1], 0.0), _ROUNDING)
         lowest, highest = self.tolerance / _BAND, min(self.tolerance * _BAND, 0.5)
-        cuts = [
-            (above / below, min(max(sqrt(above * below), lowest), highest))
-            for above, below in pairwise(left)
-            if above > lowest and below < highest and above >= _CLEAR * below
-        ]
-        for _, cut in sorted(cuts, reverse=True):
-            again = column_basis(self.factor, scale=self.sizes, negligible=cut)
-            if _ratio(again) >= _CLEAR:
-                return again
+        for above, below in sorted(pairwise(left), key=lambda pair: pair[1] / pair[0]):
+            if above > lowest and below < highest and above >= _CLEAR * below:
+                cut = min(max(sqrt(above * below), lowest), highest)
+                again = column_basis(self.factor, scale=self.sizes, negligible=cut)
+                if _ratio(again) >= _CLEAR:
+                    return again
         return basis
 
     def neglected(self, matrix: Array) -> tuple[str, ...]:
@@ -146,24 +140,21 @@ class TorqueColumns:
 
     def torque_error(self, kept: NDArray[np.int64], matrix: Array) -> float:
         """Largest relative torque error of base parameters. Shapes: (b,), (b, p)."""
-        model, G = self.model, self.constraint
-        rng = np.random.default_rng(1)
+        model, rng = self.model, np.random.default_rng(1)
         if self.samples is None:
-            free = np.eye(model.n) if G is None else G
+            free = np.eye(model.n) if self.constraint is None else self.constraint
             u = rng.uniform(-1.0, 1.0, (3, _CHECKED, free.shape[1])) @ free.T
             samples = np.pi * u[0], 2.0 * u[1], 2.0 * u[2]
         else:
-            N = len(self.samples[0])
-            some = np.unique(np.linspace(0, N - 1, _CHECKED).astype(np.int64))
-            samples = self.samples[0][some], self.samples[1][some], self.samples[2][some]
+            some = np.linspace(0, len(self.samples[0]) - 1, _CHECKED).astype(np.int64)
+            samples = tuple(x[np.unique(some)] for x in self.samples)
         W = torque_regressor(model, *samples, drive=self.drive, friction=self.friction)
-        if G is not None:
-            W = np.einsum("iu,kip->kup", G, W)
+        if self.constraint is not None:
+            W = np.einsum("iu,kip->kup", self.constraint, W)
         pi = rng.normal(size=W.shape[-1])
         torque = W @ pi
-        error = np.abs(W[..., kept] @ (matrix @ pi) - torque).max(initial=0.0)
-        largest = float(np.abs(torque).max(initial=0.0))
-        return float(error) / largest if largest > 0.0 else 0.0
+        error = float(np.abs(W[..., kept] @ (matrix @ pi) - torque).max(initial=0.0))
+        return error / (float(np.abs(torque).max(initial=0.0)) or 1.0)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -171,12 +162,8 @@ class TorqueColumns:
         basis, names, notes = self.basis, np.array(self.names), ()
         kept, other = basis.gap
         if _ratio(basis) < _CLEAR:
-            is_kept = np.isin(np.arange(len(names)), basis.kept)
-            uncertain = np.where(
-                is_kept,
-                basis.distance < _CLEAR * other,
-                basis.distance > max(kept / _CLEAR, _ROUNDING),
-            )
+            uncertain = basis.distance > max(kept / _CLEAR, _ROUNDING)
+            uncertain[basis.kept] = basis.distance[basis.kept] < _CLEAR * other
             notes += (
                 f"No clear gap: a parameter is kept with {kept:.1e} of the largest torque beyond "
                 f"the others, one left out with {other:.1e}. Uncertain: "
@@ -186,10 +173,10 @@ class TorqueColumns:
         if self.samples is not None:
             whole = replace(self, samples=None).basis.kept
             if basis.rank < len(whole):
-                missing = names[np.setdiff1d(whole, basis.kept)]
+                missing = _listed(names[np.setdiff1d(whole, basis.kept)])
                 notes += (
                     f"This motion excites {basis.rank} of the {len(whole)} base parameters; not "
-                    f"kept: {_listed(missing)}.",
+                    f"kept: {missing}.",
                 )
         return notes
 

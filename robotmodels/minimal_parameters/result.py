@@ -211,7 +211,7 @@ class BaseParameters:
         """The terms of each kept parameter; coefficients in symbols of the table, or in numbers."""
         if self.method is BaseMethod.NUMERIC:
             return self.numbers
-        model = aligned_robot(self.model, self.angle).model
+        model = aligned_robot(self.model, self.angle)[0]
         texts = symbolic_texts(model, self.drive, self.kept, self.matrix, self.tolerance)
         return formulas(self.parameter_names, self.kept, self.matrix, texts)
 

@@ -38,7 +38,6 @@ from math import sqrt
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..drive import DriveKind, Drives, drive_kinds
@@ -86,17 +85,11 @@ def motion_spans(model: RobotModel, tolerance: float = EXACT) -> tuple[MotionSpa
     chain, length = model.chain, tolerance * reach(model)
     spans = [MotionSpan(RotationRank.NONE, np.zeros(3), (), np.zeros(3))]
     for k in range(model.f):
-        before = spans[int(chain.antecedent[k])]
-        R, P = chain.rotation[k], chain.position[k]
+        before, R, P = spans[int(chain.antecedent[k])], chain.rotation[k], chain.position[k]
         after = _with_joint(before, int(chain.sigma[k]), R[:, 2], P, tolerance, length)
-        spans.append(
-            MotionSpan(
-                after.rotations,
-                after.direction @ R,
-                tuple(slide @ R for slide in after.slides),
-                None if after.centre is None else (after.centre - P) @ R,
-            )
-        )
+        slides = tuple(slide @ R for slide in after.slides)
+        centre = None if after.centre is None else (after.centre - P) @ R
+        spans.append(MotionSpan(after.rotations, after.direction @ R, slides, centre))
     return tuple(spans)
 
 
@@ -150,7 +143,7 @@ def gravities(model: RobotModel, tolerance: float = EXACT) -> list[Array]:
 def loads_of(model: RobotModel, tolerance: float = EXACT) -> list[float]:
     """Gravity along the axis of each frame with every joint at zero; none is exactly 0."""
     least = tolerance * float(np.linalg.norm(model.gravity))
-    loads = [float(gravity[2]) for gravity in gravities(model, tolerance)[1:]]
+    loads = (float(gravity[2]) for gravity in gravities(model, tolerance)[1:])
     return [load if abs(load) > least else 0.0 for load in loads]
 
 
@@ -209,14 +202,10 @@ class _Regrouping:
 
     # --- sums ---
 
-    def take(self, parameter: int) -> Combination:
-        """Remove a parameter and return its combination."""
-        return self.stays.pop(parameter)
-
     def drop(self, j: int, places: Iterable[int]) -> None:
         """Remove parameters of a link that have no effect."""
         for place in places:
-            self.take(10 * (j - 1) + place)
+            self.stays.pop(10 * (j - 1) + place)
 
     def add(self, parameter: int, factor: Any, combination: Combination) -> None:
         """Regroup a combination into a parameter; one without effect is skipped."""
@@ -252,16 +241,24 @@ class _Regrouping:
                 self.add(10 * (frame - 1) + MX + i, P[i], combination)
             self.add_tensor(frame, _skew(P).T @ _skew(P), combination)
 
+    def move_tensor(self, j: int, frame: int) -> None:
+        """Regroup the inertia tensor of a link, turned, into a frame."""
+        R = self.rows[j - 1].rotation
+        for place, (i, k) in enumerate(_J):
+            unit = np.zeros((3, 3), dtype=np.int64)
+            unit[i, k] = unit[k, i] = 1
+            self.add_tensor(frame, R @ unit @ R.T, self.stays.pop(10 * (j - 1) + place))
+
     # --- rules ---
 
     def apply(self, j: int) -> None:
         """Apply the rules of a joint; those of its drive are the first."""
         a, sigma = int(self.model.chain.antecedent[j - 1]), self.model.chain.sigma[j - 1]
-        if sigma != FIXED:
-            self._regroup_drive(j, a)
         if sigma == FIXED:
             self._regroup_body(j, a)
-        elif self.spans[j].rotations is RotationRank.NONE:
+            return
+        self._regroup_drive(j, a)
+        if self.spans[j].rotations is RotationRank.NONE:
             self.drop(j, range(M))
         elif sigma == REVOLUTE:
             self._regroup_revolute(j, a)
@@ -272,7 +269,7 @@ class _Regrouping:
         first, span, row = 10 * (j - 1), self.spans[j], self.rows[j - 1]
         z, P = row.rotation[:, 2], row.position
         weight = float(np.linalg.norm(self.gravity[j]))
-        self.add_mass(a, P, self.take(first + M))
+        self.add_mass(a, P, self.stays.pop(first + M))
         if span.rotations is RotationRank.ONE:
             e = span.direction
             self.drop(j, (*range(ZZ), MZ))
@@ -281,35 +278,32 @@ class _Regrouping:
             if span.centre is not None and unloaded and not across:
                 self.drop(j, (MX, MY))
             return
-        yy = self.take(first + YY)
+        yy = self.stays.pop(first + YY)
         self.add(first + XX, -1, yy)
         self.add_tensor(a, np.eye(3, dtype=np.int64) - np.outer(z, z), yy)
-        self.add_moment(a, z, P, self.take(first + MZ))
+        self.add_moment(a, z, P, self.stays.pop(first + MZ))
 
     def _regroup_prismatic(self, j: int, a: int) -> None:
         first, span, row, e = 10 * (j - 1), self.spans[j], self.rows[j - 1], self.directions[j - 1]
-        R = row.rotation
-        for place in range(6):
-            tensor = R @ _unit_tensor(place) @ R.T
-            self.add_tensor(a, tensor, self.take(first + place))
+        self.move_tensor(j, a)
         if span.rotations is not RotationRank.ONE:
             return
         last = max(i for i in range(3) if abs(span.direction[i]) > self.tolerance)
-        along = self.take(first + MX + last)
+        along = self.stays.pop(first + MX + last)
         for i in range(last):
             if abs(span.direction[i]) > self.tolerance:
                 self.add(first + MX + i, -e[i] / e[last], along)
         if parallel(span.direction, np.array([0.0, 0.0, 1.0]), self.tolerance):
             for i in range(2):
-                self.add_moment(a, R[:, i], row.position, self.take(first + MX + i))
+                moment = self.stays.pop(first + MX + i)
+                self.add_moment(a, row.rotation[:, i], row.position, moment)
 
     def _regroup_body(self, j: int, a: int) -> None:
         first, R, P = 10 * (j - 1), self.rows[j - 1].rotation, self.rows[j - 1].position
-        for place in range(6):
-            self.add_tensor(a, R @ _unit_tensor(place) @ R.T, self.take(first + place))
+        self.move_tensor(j, a)
         for i in range(3):
-            self.add_moment(a, R[:, i], P, self.take(first + MX + i))
-        self.add_mass(a, P, self.take(first + M))
+            self.add_moment(a, R[:, i], P, self.stays.pop(first + MX + i))
+        self.add_mass(a, P, self.stays.pop(first + M))
 
     def _regroup_drive(self, j: int, a: int) -> None:
         joint, first = int(self.model.chain.joint[j - 1]), 10 * (j - 1)
@@ -321,7 +315,7 @@ class _Regrouping:
         if self.model.chain.sigma[j - 1] == REVOLUTE:
             crosses = one and abs(z @ before.direction) <= self.tolerance
             if is_first or crosses:
-                self.add(first + ZZ, 1, self.take(Ia))
+                self.add(first + ZZ, 1, self.stays.pop(Ia))
             return
         still = is_first or (one and parallel(z, before.direction, self.tolerance))
         if not still or any(abs(slide @ z) > self.tolerance for slide in before.slides):
@@ -330,20 +324,12 @@ class _Regrouping:
         if row.load != 0:
             if DriveKind.OFFSET not in self.starts:
                 return
-            moved, factor = self.take(self.starts[DriveKind.OFFSET] + joint), -1 / row.load
+            moved, factor = self.stays.pop(self.starts[DriveKind.OFFSET] + joint), -1 / row.load
             self.add(Ia, -factor, moved)
         else:
-            moved, factor = self.take(Ia), 1
+            moved, factor = self.stays.pop(Ia), 1
         self.add(first + M, factor, moved)
         self.add_mass(a, row.position, {k: -factor * c for k, c in moved.items()})
-
-
-def _unit_tensor(place: int) -> NDArray[np.int64]:
-    """The inertia tensor whose parameter at a place, XX to ZZ, is 1 and whose others are 0."""
-    tensor = np.zeros((3, 3), dtype=np.int64)
-    i, k = _J[place]
-    tensor[i, k] = tensor[k, i] = 1
-    return tensor
 
 
 def _skew(p: Array) -> Array:

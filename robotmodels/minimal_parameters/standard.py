@@ -12,6 +12,7 @@ from .._arrays import Array, Frozen, read_only
 from ..drive import DriveParameters
 from ..dynamics import base_model
 from ..errors import InvalidValueError
+from ..friction import check_linear
 from ..inertia import InertialParameters
 from ..model import RobotModel
 from ..table_text import boxed
@@ -110,9 +111,8 @@ class StandardParameters(Frozen):
         """Parameters of the friction model, shape (k, n)."""
         if self.base.friction is None:
             return None
-        kinds = self.base.friction.kinds  # type: ignore[attr-defined]
-        n = self.base.model.n
-        return self.values[len(self.values) - n * len(kinds) :].reshape(-1, n)
+        n, model = self.base.model.n, check_linear(self.base.friction)
+        return self.values[len(self.values) - n * len(model.kinds) :].reshape(-1, n)
 
     @property
     def status(self) -> PhysicalStatus:
@@ -137,10 +137,9 @@ class StandardParameters(Frozen):
     @property
     def optimality(self) -> str:
         """Sentence on the gap."""
-        early = (
-            self.status is PhysicalStatus.INACCURATE
-        )  # the dual value bounds only at its optimum
-        word = "estimated to be within" if early else "within"
+        # the dual value bounds only at its optimum
+        is_early = self.status is PhysicalStatus.INACCURATE
+        word = "estimated to be within" if is_early else "within"
         return f"The sum of squares is {word} {100.0 * self.fit.gap:.1g} % of the optimum."
 
     @property
@@ -178,26 +177,20 @@ class StandardParameters(Frozen):
         return model.with_transmission(robot.transmission)
 
     def __str__(self) -> str:
-        worst = float(abs(self.deviation).max(initial=0.0))
-        lines = (
-            self.reason(),
-            f"Residuals: {self.residual_increase:.3g} % above least squares; largest deviation of "
-            f"a base parameter {worst:.2e}; distance from the prior {self.distance:.3g}.",
-            boxed(self._columns()),
-            "SI units: XX to ZZ kg m^2, MX to MZ kg m, M kg; drives as in their tables.",
-        )
-        return "\n".join(lines)
-
-    def _columns(self) -> list[tuple[str, list[str]]]:
-        """Columns of the table: parameter, prior, value and difference."""
         sizes = np.maximum(np.abs(self.prior), np.abs(self.values))
         small = _ZERO * largest_of_kind(self.names, sizes)
+        change = self.values - self.prior
         columns = [("parameter", list(self.names))]
         for title, numbers in (("prior", self.prior), ("value", self.values)):
             columns.append((title, [f"{x:.6g}" for x in np.where(sizes > small, numbers, 0.0)]))
-        change = self.values - self.prior
         changes = [f"{x:+.3g}" if x else "0" for x in np.where(np.abs(change) > small, change, 0.0)]
-        return [*columns, ("difference", changes)]
+        worst = float(abs(self.deviation).max(initial=0.0))
+        return (
+            f"{self.reason()}\nResiduals: {self.residual_increase:.3g} % above least squares; "
+            f"largest deviation of a base parameter {worst:.2e}; distance from the prior "
+            f"{self.distance:.3g}.\n{boxed([*columns, ('difference', changes)])}\n"
+            "SI units: XX to ZZ kg m^2, MX to MZ kg m, M kg; drives as in their tables."
+        )
 
     def __repr__(self) -> str:
         return (

@@ -95,7 +95,7 @@ def _content(base: Any) -> tuple[list[tuple[Formula, Formula]], list[Constant], 
     ]
     if base.method.value == "numeric":
         return rows, [], lists
-    constants = constants_of(aligned_robot(base.model, base.angle).model, base.tolerance)
+    constants = constants_of(aligned_robot(base.model, base.angle)[0], base.tolerance)
     return rows, [constant for constant in constants if constant.text in words], lists
 
 

@@ -348,7 +348,7 @@ MUTATIONS = [
     Mutation("minimal parameters", "the second mixed term of a first moment is lost",
         "def add_moment(self, frame", "crossed + crossed.T", "crossed", BASE),
     Mutation("minimal parameters", "a prismatic joint's tensor is turned backwards on one side",
-        "def _regroup_prismatic(", "tensor = R @", "tensor = R.T @", BASE),
+        "def move_tensor(", "R @ unit", "R.T @ unit", BASE),
     Mutation("minimal parameters", "rotor inertia regroups whether or not the axes are square",
         "def _regroup_drive(", "abs(z @ before.direction) <= self.tolerance", "True", BASE),
     Mutation("minimal parameters", "first moments across a slide stay", "def _regroup_prismatic(",
