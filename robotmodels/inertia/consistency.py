@@ -2,6 +2,13 @@
 
 P. M. Wensing, S. Kim and J.-J. E. Slotine, "Linear matrix inequalities for physically consistent
 inertial parameter identification", IEEE RA-L 3(1), 2018, section III.
+
+Parameters
+----------
+link, problems : int, tuple of str
+    Frame number; one sentence each, none if the parameters are physically consistent.
+links : tuple of LinkFinding
+    In table order.
 """
 
 from __future__ import annotations
@@ -23,13 +30,7 @@ class InertiaWarning(RobotModelsWarning):
 
 @dataclass(frozen=True, slots=True)
 class LinkFinding:
-    """Result of the consistency check of one link.
-
-    Parameters
-    ----------
-    link, problems : int, tuple of str
-        Frame number; one sentence each, none if the parameters are physically consistent.
-    """
+    """Result of the consistency check of one link."""
 
     link: int
     problems: tuple[str, ...]
@@ -46,13 +47,7 @@ class LinkFinding:
 
 @dataclass(frozen=True, slots=True)
 class ConsistencyReport:
-    """Physical consistency of a set of inertial parameters.
-
-    Parameters
-    ----------
-    links : tuple of LinkFinding
-        In table order.
-    """
+    """Physical consistency of a set of inertial parameters."""
 
     links: tuple[LinkFinding, ...]
 
@@ -88,8 +83,7 @@ def link_finding(j: int, row: Array) -> LinkFinding:
     largest = float(np.abs(row).max()) or 1.0
     scaled = row / largest  # scaled against overflow
     tensor, h, M = scaled[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]], scaled[6:9], float(scaled[9])
-    problems = []
-    central = tensor
+    problems, central = [], tensor
     if M > 0:
         with np.errstate(over="ignore", invalid="ignore"):
             S = se3.skew(h / np.sqrt(M))
@@ -97,10 +91,9 @@ def link_finding(j: int, row: Array) -> LinkFinding:
         if not np.isfinite(central).all():
             central = tensor
             problems.append("too little mass for its first moments")
-    elif M < 0:
-        problems.append(f"negative mass {row[9]:g} kg")
     else:
-        problems.append("first moments without mass" if h.any() else "no mass")
+        none = "first moments without mass" if h.any() else "no mass"
+        problems.append(f"negative mass {row[9]:g} kg" if M < 0 else none)
     moments = np.linalg.eigvalsh(central)
     rounding = _ROUNDING * max(float(np.abs(moments).max()), float(np.abs(tensor).max()))
     gap = float(moments[0] + moments[1] - moments[2])
@@ -109,9 +102,7 @@ def link_finding(j: int, row: Array) -> LinkFinding:
     if gap < -rounding:
         problems.append(f"triangle inequality fails by {-gap * largest:.3g} kg m^2")
     pseudo = pseudo_inertia(scaled)
-    smallest, trace = np.linalg.eigvalsh(pseudo)[0], np.abs(np.diag(pseudo)).sum()
-    if smallest < -_ROUNDING * trace and not problems:
-        problems.append(
-            f"an eigenvalue of the pseudo-inertia is {smallest / trace:.3g} of its trace"
-        )
+    share = np.linalg.eigvalsh(pseudo)[0] / (np.abs(np.diag(pseudo)).sum() or 1.0)
+    if share < -_ROUNDING and not problems:
+        problems.append(f"an eigenvalue of the pseudo-inertia is {share:.3g} of its trace")
     return LinkFinding(j + 1, tuple(problems))

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_reals, as_vector
+from .._arrays import Array, as_each, as_vector
 from ..errors import InvalidValueError
 from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
-from .shapes import Obstacle, Plane, checked_length, nearest_points, unit_between
+from .shapes import Obstacle, Plane, nearest_points, unit_between
 
 Frame = str | int | None
 Segment = tuple[Frame, Frame]
@@ -96,7 +96,7 @@ def link_distances(
     """
     N = len(q)
     segments = links(model) if segments is None else segments
-    size = _radii(radius, len(segments))
+    size = as_each(radius, len(segments), "radius", least=0.0, finite=True, default=0.0)
     samples = np.random.default_rng(0).uniform(-3.0, 3.0, (_SAMPLES, model.n))
     q = np.concatenate((q, samples))
     frames = list(dict.fromkeys(frame for pair in segments for frame in pair))
@@ -180,19 +180,6 @@ def checked_segments(segments: Any) -> Any:
             "twice the same frame."
         )
     return pairs
-
-
-def _radii(radius: float | ArrayLike | None, count: int) -> Array:
-    """Radius of each segment."""
-    given = as_reals(0.0 if radius is None else radius, "radius")
-    if given.ndim == 0:
-        return np.full(count, checked_length(given, "radius"))
-    if given.shape != (count,) or not ((given >= 0.0) & (given < np.inf)).all():
-        raise InvalidValueError(
-            f"radius: expected metres that are not negative, one or {count} numbers, got "
-            f"{radius!r:.60}."
-        )
-    return given
 
 
 def _along(away: Array, J: Array, K: Array, t: Array) -> Array:

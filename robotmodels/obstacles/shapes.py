@@ -4,6 +4,17 @@ The members of the family have one method, ``nearest(start, end)``: of segments 
 the signed distance (...), negative inside, the parameter t (...) of the nearest point
 ``start + t (end - start)``, and the gradient (..., 3) of the distance by that point.
 
+Parameters
+----------
+center, start, end, point : array_like, shape (3,)
+    Centre of a sphere, ends of the axis of a capsule, a point on a plane, in the world, m.
+radius : float
+    Radius, m, not negative; 0 is a point or a line.
+normal : array_like, shape (3,)
+    Towards the free side; made a unit vector.
+lower, upper : array_like, shape (3,)
+    Opposite corners in the world, m; infinite where there is no face.
+
 Raises
 ------
 ShapeError, InvalidValueError
@@ -16,9 +27,8 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from .._arrays import Array, Value, as_exact, as_reals, read_only
+from .._arrays import Array, Value, as_exact, as_number, as_reals, read_only
 from ..errors import InvalidValueError, ShapeError
 
 Nearest = tuple[Array, Array, Array]
@@ -37,22 +47,14 @@ class Obstacle(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sphere(Value):
-    """A solid sphere.
-
-    Parameters
-    ----------
-    center : array_like, shape (3,)
-        In the world, m.
-    radius : float
-        Radius, m, not negative; 0 is a point.
-    """
+    """A solid sphere."""
 
     center: Array
     radius: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", read_only(as_exact(self.center, (3,), "center")))
-        object.__setattr__(self, "radius", checked_length(self.radius, "radius"))
+        object.__setattr__(self, "radius", as_number(self.radius, "radius", least=0.0))
 
     def nearest(self, start: Array, end: Array) -> Nearest:
         """Distance from the centre, less the radius."""
@@ -61,15 +63,7 @@ class Sphere(Value):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Capsule(Value):
-    """A solid cylinder with round ends: the points near a segment, such as a post or a pipe.
-
-    Parameters
-    ----------
-    start, end : array_like, shape (3,)
-        Ends of the axis in the world, m.
-    radius : float
-        Radius, m, not negative.
-    """
+    """A solid cylinder with round ends: the points near a segment, such as a post or a pipe."""
 
     start: Array
     end: Array
@@ -78,7 +72,7 @@ class Capsule(Value):
     def __post_init__(self) -> None:
         object.__setattr__(self, "start", read_only(as_exact(self.start, (3,), "start")))
         object.__setattr__(self, "end", read_only(as_exact(self.end, (3,), "end")))
-        object.__setattr__(self, "radius", checked_length(self.radius, "radius"))
+        object.__setattr__(self, "radius", as_number(self.radius, "radius", least=0.0))
 
     def nearest(self, start: Array, end: Array) -> Nearest:
         """Distance from the axis, less the radius."""
@@ -87,15 +81,7 @@ class Capsule(Value):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plane(Value):
-    """A half space bounded by a plane, such as a floor, a table or a wall.
-
-    Parameters
-    ----------
-    point : array_like, shape (3,)
-        On the plane, in the world, m.
-    normal : array_like, shape (3,)
-        Towards the free side; made a unit vector.
-    """
+    """A half space bounded by a plane, such as a floor, a table or a wall."""
 
     point: Array
     normal: Array
@@ -117,13 +103,7 @@ class Plane(Value):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Box(Value):
-    """A box whose edges are parallel to the axes of the world.
-
-    Parameters
-    ----------
-    lower, upper : array_like, shape (3,)
-        Opposite corners in the world, m; infinite where there is no face.
-    """
+    """A box whose edges are parallel to the axes of the world."""
 
     lower: Array
     upper: Array
@@ -202,13 +182,3 @@ def _from_axis(start: Array, end: Array, a: Array, b: Array, radius: float) -> N
     point = start + s[..., None] * along
     distance, unit = unit_between(point, a + t[..., None] * (b - a), along)
     return distance - radius, s, unit
-
-
-def checked_length(value: ArrayLike, name: str) -> float:
-    """A finite length that is not negative."""
-    number = as_reals(value, name)
-    if number.ndim or not 0.0 <= number < np.inf:
-        raise InvalidValueError(
-            f"{name}: expected a number of metres that is not negative, got {value!r:.60}."
-        )
-    return float(number)

@@ -72,14 +72,14 @@ class Feedback:
                 f"delay: expected less than the duration {end - start:.6g} s, got {delay:.6g} s; "
                 "no torque would act."
             )
-        count = max(1, ceil((end - start) / period - 1e-9))
+        k = np.arange(max(1.0, ceil((end - start) / period - 1e-9)))
+        tolerance = 1e-9 * period
         # a torque that acts at a later sample acts exactly then
         whole = int(delay / period + 1e-9)
         rest = delay - whole * period
-        rest = 0.0 if rest < 1e-9 * period else rest
-        k, tolerance = np.arange(count, dtype=np.float64), 1e-9 * period
         taken = _snapped(start + period * k, near, tolerance)
-        acts = _snapped(start + period * (k + whole) + rest, near, tolerance)
+        acts = start + period * (k + whole) + (rest if rest >= tolerance else 0.0)
+        acts = _snapped(acts, near, tolerance)
         self._taken, self._acts = deque(taken.tolist()), deque(acts[acts < end].tolist())
         self.instants = tuple(sorted({*self._taken, *self._acts}))
         self._period, self._sampled, self.state0 = period, True, _NONE

@@ -245,7 +245,7 @@ def _check_start(model: RobotModel, q: Array, v: Array, drive: bool) -> None:
     if model.transmission is not None and not model.transmission.is_invertible:
         raise InvalidValueError(
             f"model: {model.name!r} has joints that mimic others, which simulate does not support. "
-            "Integrate ddm, or simulate independent joints with model.with_transmission(None)."
+            "Integrate ddm, or take model.with_transmission(None)."
         )
     if not finite:
         raise InvalidValueError(

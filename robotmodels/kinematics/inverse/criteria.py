@@ -60,7 +60,7 @@ from ...obstacles.clearance import (
     link_distances,
     links,
 )
-from ...obstacles.shapes import Obstacle, checked_length
+from ...obstacles.shapes import Obstacle
 from ..jacobians import COMPONENTS, Reference, jacobian, jacobian_rate, reference_of
 from .bounds import as_limit, check_order, for_joints
 
@@ -274,7 +274,7 @@ class ObstacleCriterion(_Squares):
         if not bodies:
             raise InvalidValueError("obstacles: expected at least one, got none.")
         object.__setattr__(self, "obstacles", bodies)
-        object.__setattr__(self, "radius", checked_length(self.radius, "radius"))
+        object.__setattr__(self, "radius", as_number(self.radius, "radius", least=0.0))
         object.__setattr__(self, "segments", checked_segments(self.segments))
         _set_numbers(self, "influence", "gain")
 
