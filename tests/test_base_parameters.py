@@ -18,7 +18,6 @@ from robotmodels.minimal_parameters.rules import reach
 from robotmodels.regressors import parameter_names, torque_regressor
 
 GRAVITIES = ((0.0, 0.0, -9.81), (0.0, -9.81, 0.0), (-9.81, 0.0, 0.0), (0.0, 0.0, 0.0))
-CATALOGUE = [name for name in rm.robots() if rm.load(name).f < 30]  # frozen ones have all
 
 
 KINDS = (True, False, ("Ia", "Fv", "Fc"), ("Ia",), ("Fv", "offset"), ())
@@ -89,18 +88,6 @@ def filled(model, rng):
 
 def of_rows(*rows):
     return rm.RobotModel.from_table(rm.DHTable.from_rows(rows))
-
-
-@pytest.mark.parametrize("name", CATALOGUE)
-@pytest.mark.nightly
-def test_rules_and_numbers_agree_on_the_catalogue(name, rng):
-    rules, numbers = by_both(rm.load(name), rng)
-    kept, dependent = numbers.gap
-    assert dependent < (2e-11 if numbers.notes else 1e-13)
-    assert kept > (1e-4 if numbers.notes else 0.01)  # no parameter that no log would show
-    if rules.notes:
-        exact, _ = by_both(rm.load(name), rng, tolerance=1e-11)
-        assert turned(exact) < 1e-9
 
 
 @pytest.mark.parametrize("build", [any_robot, right_angled_robot])
@@ -223,23 +210,6 @@ def test_formulas_have_the_values_of_the_numbers(build):
 
 
 # --- cases that other programs get wrong ---------------------------------------------------------
-
-
-def test_prismatic_and_horizontal_first_axes():
-    """Cases that other programs get wrong, and a robot without joints."""
-    quarter = np.pi / 2
-    base = base_parameters(of_rows({"sigma": 0}, {"sigma": 1, "d": 0.3}), drive=False)
-    assert dict(base.regrouping["ZZ1"]) == pytest.approx({"ZZ1": 1, "ZZ2": 1, "MX2": 0.6})
-    assert base.names == ("ZZ1", "M2")
-    for theta, kept in ((0.0, ("MX2", "MZ2")), (quarter, ("MY2", "MZ2"))):
-        model = of_rows({"sigma": 0}, {"sigma": 1, "alpha": quarter, "theta": theta})
-        base = base_parameters(model, drive=False)
-        assert tuple(n for n in base.names if n.startswith("M") and n != "M2") == kept
-    base = base_parameters(of_rows({"sigma": 0, "alpha": quarter}, {"sigma": 0, "d": 0.4}))
-    assert "Ia1" in base.regrouping["ZZ1"]
-    assert "Ia2" in base.names
-    for method in ("symbolic", "numeric"):
-        assert len(base_parameters(of_rows({"sigma": 2, "d": 0.2}), method)) == 0
 
 
 def test_counts_of_the_literature_and_coupled_motors():

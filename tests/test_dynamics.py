@@ -193,12 +193,11 @@ def test_first_moments_over_hardly_any_mass_lose_no_digits(mass):
     table = rm.DHTable.from_rows([{"sigma": 0}, {"sigma": 0, "d": 0.3, "alpha": 1.0}])
     values = [[1, 0, 0, 1, 0, 1, 0.5, 0, 0, mass], [1, 0.1, 0, 1, 0, 2, 0.1, 0.2, 0.3, mass]]
     arm = rm.RobotModel.from_table(table, rm.InertialParameters(values), gravity=(1, 2, 3))
-    q, v, a = [0.3, 0.4], [0.5, 0.6], [0.7, 0.8]
-    close(rm.idm(arm, q, v, a), rm.idm(arm, [q], v, a)[0], 1e-13)
-    close(rm.mass_matrix(arm, q), rm.mass_matrix(arm, [q])[0], 1e-13)
-    close(rm.coriolis_matrix(arm, q, v), rm.coriolis_matrix(arm, [q], v)[0], 1e-13)
-    parameters = rm.parameter_vector(arm)
-    close(rm.idm(arm, q, v, a), rm.torque_regressor(arm, q, v, a) @ parameters, 1e-13)
+    state = np.array([[0.3, 0.4], [0.5, 0.6], [0.7, 0.8]])
+    for model, count in ((rm.idm, 3), (rm.mass_matrix, 1), (rm.coriolis_matrix, 2)):
+        close(model(arm, *state[:count]), model(arm, *state[:count, None])[0], 1e-13)
+    W = rm.torque_regressor(arm, *state)
+    close(rm.idm(arm, *state), W @ rm.parameter_vector(arm), 1e-13)
 
 
 # --- payloads and base parameters ---------------------------------------------------------------

@@ -121,23 +121,6 @@ def test_kinds_of_drives_have_columns_of_their_own(model, name):
         assert (h.shape[-1] > 10 * model.f) == ("Ia" in words)
 
 
-@pytest.mark.parametrize("drive", [False, "Ia"])
-def test_energy_of_base_parameters(model, drive):
-    """But for a constant, and without friction and offsets, which store none."""
-    q, v, _ = states(model, 3, 2)
-    base = base_parameters(model, drive=drive)
-    h = rm.energy_regressor(model, q, v, drive, columns=base)
-    np.testing.assert_array_equal(h, base.reduce(rm.energy_regressor(model, q, v, drive)))
-    energy = rm.kinetic_energy(model, q, v, bool(drive)) + rm.potential_energy(model, q)
-    change = (h[0] - h[1]) @ base.values(model)
-    np.testing.assert_allclose(change, energy[0] - energy[1], rtol=1e-9)
-    whole = base_parameters(model, drive=True)
-    with pytest.raises(InvalidValueError, match=r"no column 'Fv.*drive=\('Ia',\)"):
-        rm.energy_regressor(model, q, v, columns=whole)
-    with pytest.raises(ShapeError, match=r"An energy has no columns of Fv, Fc, offset.*'Ia'"):
-        whole.reduce(rm.energy_regressor(model, q, v))
-
-
 # --- filters ---------------------------------------------------------------------------------
 
 
@@ -166,6 +149,11 @@ def test_torques_through_a_filter_are_the_means_of_neighbours_through_it(order):
         (lambda m, q: filtered_regressor(m, 0.0, q, q, FILTER), InvalidValueError, "^dt: expect"),
         (lambda m, q: chunked(torque_regressor, m, q, q), InvalidValueError, "got 2 arrays"),
         (lambda m, q: rm.parameter_names(m, drive=("Iam",)), InvalidValueError, "one of 'ia', .*"),
+        (
+            lambda m, q: rm.energy_regressor(m, q, q, columns=base_parameters(m)),
+            InvalidValueError,
+            r"no column 'Fv.*drive=\('Ia',\)",
+        ),
         (lambda m, q: rm.idm(m, q, q, q, drive=("Ia",)), InvalidValueError, "True or False here"),
     ],
 )

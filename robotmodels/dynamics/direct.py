@@ -40,15 +40,6 @@ def ddm(
 
     Mimic joints follow, and ``K^T tau`` is that of ``idm``.
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    q, v, tau : array_like, shape (..., n)
-        Joint variables (rad or m), velocities and torques; the leading axes broadcast.
-    wrench, drive, friction
-        As for `idm`.
-
     Returns
     -------
     ndarray, shape (..., n)

@@ -2,22 +2,10 @@
 
 Book sections 1.5.2.2 and 1.5.3.
 
-Parameters
-----------
-model : RobotModel
-    The robot; geometry, base, tool, gravity and drive parameters of the kinds that are not
-    among the base ones are taken from it.
-base : BaseParameters
-    The b base parameters.
-values : array_like, shape (b,)
-    Their values, such as identified ones or ``base.values(model)``.
-q, v, a, wrench, friction
-    As for `idm`; friction acts besides that whose parameters are among the base ones.
-
 Returns
 -------
 RobotModel or ndarray
-    A new model, or torques (..., n) as of `idm`.
+    A new model, or torques (..., n) as of `idm`. Geometry, base, tool and gravity are the model's.
 
 Raises
 ------

@@ -36,21 +36,7 @@ def idm(
 
     It is linear in the inertial parameters; base parameters and negative masses are allowed, too.
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    q, v, a : array_like, shape (..., n)
-        Joint variables (rad or m), velocities and accelerations; the leading axes broadcast. A
-        robot without ``v`` or ``a`` is at rest.
-    wrench : array_like, shape (..., 6), optional
-        Force and moment ``[f; m]`` (N, N m) that the tool exerts on the environment, at the tool
-        point, in world axes.
-    drive : bool
-        Whether rotor inertia, friction and offsets of the model's drives are included.
-    friction : Friction, optional
-        A friction model that acts besides the Fv, Fc and offset of the drives, see
-        `robotmodels.friction`; ``model.with_drive(...)`` removes those.
+    A robot without ``v`` or ``a`` is at rest.
 
     Returns
     -------

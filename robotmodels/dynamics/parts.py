@@ -1,14 +1,5 @@
 """Parts of the dynamic model: masses, Coriolis and centrifugal torques, gravity, energies.
 
-Parameters
-----------
-model : RobotModel
-    The robot, n joints.
-q, v : array_like, shape (..., n)
-    Joint variables (rad or m) and velocities; the leading axes broadcast.
-drive : bool
-    Whether rotor inertia (and that of coupled motors) is included.
-
 Returns
 -------
 ndarray

@@ -2,8 +2,6 @@
 
 Parameters
 ----------
-model : RobotModel
-    The robot.
 mass : float
     Kilograms, not negative.
 com : array_like, shape (3,)

@@ -32,10 +32,7 @@ FORMS = "tests/identities/test_regressor_forms.py"
 GEOMETRY = "tests/test_geometry.py"
 SE3 = "tests/test_se3.py"
 PHYSICS = "tests/identities/test_dynamic_identities.py -k base_parameters_alone"
-BASE = (
-    "tests/test_base_parameters.py"
-    " -k (random_robots or book or prismatic or horizontal or wrist or keeps)"
-)
+BASE = "tests/test_base_parameters.py -k (random_robots or book or keeps)"
 ALIGNED = "tests/test_base_parameters.py -k (aligned or slope or gravity)"
 COMPENSATOR = (
     "tests/test_gravity_compensator.py -k (slope_of_the_energy or forces_by_hand or its_work)"
