@@ -34,8 +34,6 @@ def uniform_bodies(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, f frames.
     mass : float
         Mass of all moving links together, kg.
     radius : float, optional
@@ -72,16 +70,13 @@ def check_definite(bodies: InertialParameters, name: str, frames: Sequence[str] 
     """Pseudo-inertias of bodies; raise for bodies without mass or extent. Shapes: -> (f, 4, 4)."""
     P = pseudo_inertia(bodies.values)
     bad = np.flatnonzero(~has_extent(bodies))
-    if bad.size:
-        j = int(bad[0])
+    for j in bad[:1].tolist():
         link = f"link {j + 1}" + (f" ({frames[j]})" if len(frames) > j else "")
         more = f" So are {bad.size - 1} more." if bad.size > 1 else ""
-        mass = float(bodies.mass[j])
-        report = bodies.consistency().links[j]
         raise InertiaError(
             f"{name}: {link} is not a body with mass and extent in three directions: its mass is "
-            f"{mass:.4g} kg ({report}).{more} Pass {name}=uniform_bodies(model, mass=...), or a "
-            "CAD model of every link."
+            f"{float(bodies.mass[j]):.4g} kg ({bodies.consistency().links[j]}).{more} Pass "
+            f"{name}=uniform_bodies(model, mass=...), or a CAD model of every link."
         )
     return P
 

@@ -8,8 +8,6 @@ taken, so that parameters without effect on the torques are those of the prior, 
 
 Parameters
 ----------
-base : BaseParameters
-    b base parameters of p standard ones, with the drives and friction of the values or the factor.
 prior : InertialParameters, optional
     Bodies with mass and extent, such as a CAD model or `uniform_bodies`; default the model's.
 drive_prior : DriveParameters, optional

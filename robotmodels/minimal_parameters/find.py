@@ -16,6 +16,7 @@ from ..estimation import column_basis
 from ..estimation.columns import NEGLIGIBLE
 from ..friction import Friction, check_friction, check_linear
 from ..model import RobotModel, check_model
+from ..regressors.chunks import check_log
 from .alignment import ALIGNED, aligned_robot
 from .numeric import Samples, TorqueColumns, residual_warning
 from .result import BaseMethod, BaseParameters
@@ -48,13 +49,8 @@ def base_parameters(
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, f frames and n joints; serial or tree, any base and gravity.
     method : {"symbolic", "numeric"}
         Khalil's rules, with formulas, or the columns of the torque regressor.
-    drive : bool or collection of DriveKind or str
-        Drive parameters among the standard ones: kinds such as ``"Ia"``, True for all
-        (the offsets too), False for none. The couplings of motors belong to their kinds.
     motion : tuple of array_like, shapes (N, n), Samples or Trajectory, optional
         Positions (rad or m), velocities and accelerations of the regressor of the numeric method;
         default random ones. Parameters that logged motion does not excite are not kept.
@@ -67,9 +63,6 @@ def base_parameters(
         By default axes within 1e-5 rad are taken as parallel or perpendicular (a file may write
         1.5708), and the torques of that robot are kept to 1e-11; ``1e-11`` uses every digit of the
         table. On logged motion the limit moves to the widest gap within a factor of 30.
-    friction : Friction, optional
-        A friction model that is linear in its parameters (`robotmodels.friction`), whose columns
-        come after those of the drives.
 
     Returns
     -------
@@ -102,12 +95,10 @@ def base_parameters(
     angle, least = (ALIGNED, NEGLIGIBLE) if tolerance is None else (_part(tolerance),) * 2
     if friction is not None:
         check_linear(check_friction(friction, model.n))
-    if kind is BaseMethod.SYMBOLIC:
-        for name, value in (("motion", motion), ("constraint", constraint)):
-            if value is not None:
-                raise InvalidValueError(
-                    f"{name}: the symbolic method uses the table alone; use method='numeric'."
-                )
+    if kind is BaseMethod.SYMBOLIC and not (motion is None and constraint is None):
+        raise InvalidValueError(
+            "motion, constraint: the symbolic method uses the table alone; use method='numeric'."
+        )
     aligned, notes = aligned_robot(model, angle)
     samples = None if motion is None else _samples(model, motion)
     G = None
@@ -189,17 +180,14 @@ def _samples(model: RobotModel, motion: Any) -> Samples:
     if all(hasattr(motion, name) for name in "qva"):
         motion = (motion.q, motion.v, motion.a)
     if not isinstance(motion, (tuple, list)) or len(motion) != 3:
+        got = type(motion).__name__
         raise InvalidValueError(
-            "motion: expected three arrays (q, v, a), each of shape (N, n), or a trajectory, got "
-            f"{type(motion).__name__}."
+            f"motion: expected three arrays (q, v, a) of shape (N, n), or a trajectory, got {got}."
         )
     names = ("motion q", "motion v", "motion a")
     arrays = tuple(as_vector(x, model.n, s) for x, s in zip(motion, names, strict=True))
     q, v, a = batch_rows(arrays, names)[1]
-    if not len(q):
-        raise InvalidValueError(
-            "motion: the log is empty; give at least one sample, or none for random motion."
-        )
+    check_log(len(q), "motion")
     return q, v, a
 
 

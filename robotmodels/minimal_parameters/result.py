@@ -30,13 +30,7 @@ _SAME = 1e-9
 
 
 class BaseMethod(Enum):
-    """Method that determined base parameters.
-
-    Examples
-    --------
-    >>> BaseMethod("numeric")
-    <BaseMethod.NUMERIC: 'numeric'>
-    """
+    """Method that determined base parameters."""
 
     SYMBOLIC = "symbolic"
     NUMERIC = "numeric"
@@ -51,10 +45,6 @@ class BaseParameters:
 
     Parameters
     ----------
-    model : RobotModel
-        The robot.
-    drive : bool or collection of DriveKind or str
-        Kinds of drive parameters among the p standard parameters; stored as a tuple of `DriveKind`.
     kept : ndarray of int, shape (b,)
         Numbers of the kept standard parameters.
     matrix : ndarray, shape (b, p)
@@ -64,8 +54,6 @@ class BaseParameters:
     gap : (float, float), optional
         Rank gap of the numeric method: smallest residual norm of a kept column and largest of a
         dropped one, relative to the longest column (parameters in natural units).
-    friction : Friction, optional
-        A linear friction model whose parameters come after those of the drives.
     tolerance, angle : float
         Part of the largest torque that counts as zero; angle in rad up to which axes were aligned.
     notes : tuple of str
@@ -76,14 +64,6 @@ class BaseParameters:
     torque_error : float, optional
         Largest torque error on an independent motion, relative to the largest torque; for logged
         motion on the same samples. None for symbolic rules alone.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters import base_parameters
-    >>> base = base_parameters(load("planar_2r"), drive=False)
-    >>> base.names, dict(base.regrouping["ZZ1"])
-    (('ZZ1', 'ZZ2', 'MX2', 'MY2'), {'ZZ1': 1.0, 'M2': 1.0})
     """
 
     model: RobotModel
@@ -170,9 +150,8 @@ class BaseParameters:
             raise ShapeError(
                 f"W: expected shape (..., {p}), a column for each standard parameter (with the "
                 "same friction as these base parameters, and the same drives: "
-                f"drive={tuple(kind.value for kind in drive_kinds(self.drive))}), got {W.shape}."
-                " An energy has no columns of Fv, Fc, offset: reduce it by base parameters without "
-                "them, base_parameters(model, drive=('Ia',))."
+                f"drive={tuple(kind.value for kind in drive_kinds(self.drive))}), got {W.shape}; "
+                "for an energy, drive=('Ia',) or less."
             )
         return np.ascontiguousarray(W[..., self.kept])
 

@@ -29,8 +29,6 @@ class StandardParameters(Frozen):
 
     Parameters
     ----------
-    base : BaseParameters
-        The b base parameters and p standard parameters.
     requested, prior : ndarray, shapes (b,), (p,)
         Base parameters that were given, or those of the fit without constraints; standard
         parameters of the prior.
@@ -44,17 +42,6 @@ class StandardParameters(Frozen):
         value; ``active`` constraints; ``stopped``: the ending of a solver that stopped early.
     rows : int or None
         Number of residuals.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters import base_parameters, fit_consistent, uniform_bodies
-    >>> arm = load("planar_2r")
-    >>> base = base_parameters(arm, drive=False)
-    >>> robot = fit_consistent(base, np.eye(4), [0.2, -0.1, 0.3, 0.0],
-    ...                        prior=uniform_bodies(arm, 5.0))
-    >>> "The pseudo-inertia of link 2 is singular to the margin." in robot.reason()
-    True
     """
 
     base: BaseParameters

@@ -162,12 +162,6 @@ class BaseValues(Rebuilt, Mapping[str, float]):
         them; units.
     numbers : ndarray, shape (b,)
         Values.
-
-    Examples
-    --------
-    >>> table = BaseValues(("ZZ1",), ("ZZ1R",), [2.0], ("kg m^2",))
-    >>> table["ZZ1"], len(table)
-    (2.0, 1)
     """
 
     names: tuple[str, ...]
