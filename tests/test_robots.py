@@ -4,7 +4,6 @@ The joint placements below are the facts of the makers' and ROS-Industrial's URD
 `source` names for each robot; the poses are a plain product of them, with no code of the package.
 """
 
-import json
 import pickle
 import re
 from math import pi
@@ -97,10 +96,6 @@ PLACEMENTS = {
 FILE_ZERO = {"tx40": np.array([0, h, -h, 0, 0, 0])}
 
 
-def oracle(name):
-    return json.loads((ORACLES / f"{name}.json").read_text())
-
-
 def placement(xyz, rpy):
     T = np.eye(4)
     T[:3, :3] = pin.rpy.rpyToMatrix(*map(float, rpy))
@@ -140,29 +135,6 @@ def test_poses_are_those_of_the_published_urdf(name, rng):
         for (xyz, rpy, axis), angle in zip(joints, q - FILE_ZERO.get(name, 0), strict=True):
             T = T @ placement(xyz, rpy) @ turn(axis, angle)
         np.testing.assert_allclose(rm.dgm(model, q), T @ placement(*tool), rtol=0, atol=1e-12)
-
-
-# --- dynamics of the PUMA and drives of the TX40 ------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("name", "file"), [("puma560", "puma560_dh"), ("lab_rr", "lab_RR"), ("lab_trr", "lab_TRR")]
-)
-def test_robots_of_the_toolbox(name, file):
-    model = load(name)
-    for sample in oracle(file)["samples"]:
-        q, v, a = (np.array(sample[key]) for key in ("q", "qd", "qdd"))
-        found = {"fkine": rm.dgm(model, q), "jacob0": rm.jacobian(model, q)}
-        if name == "puma560":
-            found |= {
-                "tau": rm.idm(model, q, v, a),
-                "tau_rigid": rm.idm(model, q, v, a, drive=False),
-                "inertia": rm.mass_matrix(model, q),
-            }
-        for key, value in found.items():
-            expected = np.array(sample[key])
-            scale = max(1.0, np.abs(expected).max())
-            np.testing.assert_allclose(value, expected, rtol=0, atol=1e-12 * scale, err_msg=key)
 
 
 # --- URDF files -----------------------------------------------------------------------------------

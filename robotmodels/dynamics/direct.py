@@ -72,17 +72,15 @@ def ddm(
     check_all_or_none(drive)
     n = model.n
     q, v, tau = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(tau, n, "tau")
-    batch_shape((q, v, tau), ("q", "v", "tau"))
-    if wrench is not None:
-        wrench = as_vector(wrench, 6, "wrench")
-        batch_shape((q, v, tau, wrench), ("q", "v", "tau", "wrench"))
+    w = np.zeros(6) if wrench is None else as_vector(wrench, 6, "wrench")
+    batch_shape((q, v, tau, w), ("q", "v", "tau", "wrench"))
     if friction is not None:
         tau = tau - torque_at(check_friction(friction, n), v, q)
     drives = model.drive_matrices if drive else None
     if drives is not None:
         tau = tau - drives.torque(v, None)
     if wrench is not None:
-        tau = tau - wrench_torque(model, q, wrench)
+        tau = tau - wrench_torque(model, q, w)
     free = None if model.transmission is None else free_motion(model.transmission)
     if free is not None:
         check_follows(model, free, q, v)

@@ -47,11 +47,11 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, Rebuilt, Value, as_floats, as_vector, check_same_length, read_only
 from ..errors import InvalidValueError, ShapeError
-from .protocols import FrictionSum, together, torques_at_rest
+from .protocols import Summable
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointFriction(Value, ABC):
+class JointFriction(Summable, Value, ABC):
     """Base: parameters of shape (n,) that the fields name; a subclass defines `basis`."""
 
     kinds: ClassVar[tuple[str, ...]] = ()
@@ -73,11 +73,6 @@ class JointFriction(Value, ABC):
         """Number of joints."""
         return getattr(self, fields(self)[0].name).size
 
-    @property
-    def breakaway(self) -> Array:
-        """Torques between which a joint at rest sticks, shape (2, n): lower, upper."""
-        return np.sort(torques_at_rest(self, self.n), axis=0)
-
     @abstractmethod
     def basis(self, v: ArrayLike) -> Array:
         """Torque per unit of each parameter of its joint, shape (..., k, n)."""
@@ -85,12 +80,6 @@ class JointFriction(Value, ABC):
     def torque(self, v: ArrayLike) -> Array:
         """Torque that the joints need to overcome friction, shape (..., n)."""
         return (self.basis(v) * self.parameters).sum(axis=-2)
-
-    def __add__(self, other: object) -> FrictionSum:
-        return together(self, other)
-
-    def __radd__(self, other: object) -> FrictionSum:
-        return together(other, self)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,16 +144,8 @@ class StribeckFriction(JointFriction):
     """Stribeck friction: decreases from the static value with the velocity.
 
     ``tau = Fv v + (Fc + (Fs - Fc) exp(-|v / vs|^exponent)) sign(v)``, linear in Fv, Fc and Fs for
-    given ``vs`` and ``exponent``.
-
-    Parameters
-    ----------
-    Fv, Fc, Fs : array_like, shape (n,)
-        Viscous, Coulomb and static friction, ``Fv >= 0`` and ``Fs >= Fc >= 0``.
-    vs : array_like, shape (n,)
-        Stribeck velocity, positive, rad/s or m/s.
-    exponent : array_like, shape (n,), optional
-        Positive, default 2 for every joint.
+    given Stribeck velocity ``vs`` and ``exponent`` (default 2), both (n,) and positive; static
+    friction is ``Fs >= Fc >= 0``, and ``Fv >= 0``.
     """
 
     kinds: ClassVar[tuple[str, ...]] = ("Fv", "Fc", "Fs")
@@ -181,8 +162,7 @@ class StribeckFriction(JointFriction):
         for name in ("vs", "exponent"):
             if ((values := getattr(self, name)) <= 0.0).any():
                 raise InvalidValueError(f"{name}: expected positive numbers, got {values.min()}.")
-        zero = np.zeros(self.n)
-        for name, least in (("Fv", zero), ("Fc", zero), ("Fs", self.Fc)):
+        for name, least in (("Fv", 0.0 * self.Fv), ("Fc", 0.0 * self.Fv), ("Fs", self.Fc)):
             values = getattr(self, name)
             for j in np.flatnonzero(values < least)[:1]:
                 raise InvalidValueError(
@@ -206,11 +186,6 @@ class LoadFriction(Rebuilt):
     The load is the torque that the gears carry. It depends on positions and accelerations, so that
     this is not a `Friction`. P. Hamon, M. Gautier and P. Garrec, "Dynamic identification of robots
     with a dry friction model depending on load and velocity", IEEE/RSJ IROS 2010, (9).
-
-    Examples
-    --------
-    >>> LoadFriction([0.1]).under_load([[-2.0], [3.0]], [[50.0], [-40.0]]).ravel()
-    array([-5.,  4.])
     """
 
     Fl: Array

@@ -52,8 +52,26 @@ class LinearFriction(Friction, Protocol):
         ...
 
 
+class Summable:
+    """Base of friction models whose sum with another one is a `FrictionSum`, without nesting."""
+
+    __slots__ = ()
+
+    def __add__(self, other: object) -> FrictionSum:
+        return _together(self, other)
+
+    def __radd__(self, other: object) -> FrictionSum:
+        return _together(other, self)
+
+    @property
+    def breakaway(self) -> Array:
+        """Torques between which a joint at rest sticks, shape (2, n): lower, upper."""
+        model: Any = self
+        return np.sort(torques_at_rest(model, model.n), axis=0)
+
+
 @dataclass(frozen=True, slots=True)
-class FrictionSum:
+class FrictionSum(Summable):
     """Several friction models that act together; ``a + b`` of two friction models is one.
 
     Parameters
@@ -93,11 +111,6 @@ class FrictionSum:
         return np.concatenate([part.parameters for part in self._linear])
 
     @property
-    def breakaway(self) -> Array:
-        """Torques between which a joint at rest sticks, shape (2, n): lower, upper."""
-        return np.sort(torques_at_rest(self, self.n), axis=0)
-
-    @property
     def needs_position(self) -> bool:
         """Whether a part of it depends on positions."""
         return any(needs_position(part) for part in self.parts)
@@ -110,24 +123,17 @@ class FrictionSum:
         """Torque that the joints need to overcome friction, shape (..., n)."""
         return np.sum([torque_at(part, v, q) for part in self.parts], axis=0)
 
-    def __add__(self, other: object) -> FrictionSum:
-        return together(self, other)
-
-    def __radd__(self, other: object) -> FrictionSum:
-        return together(other, self)
-
     @property
     def _linear(self) -> tuple[LinearFriction, ...]:
         return tuple(check_linear(part) for part in self.parts)
 
 
-def together(first: object, second: object) -> FrictionSum:
-    """Sum of two friction models; nested sums are flattened."""
+def _together(*models: object) -> FrictionSum:
     parts: list[Friction] = []
-    for each in (first, second):
-        if isinstance(each, type) or not isinstance(each, Friction):
+    for model in models:
+        if isinstance(model, type) or not isinstance(model, Friction):
             return NotImplemented
-        parts += each.parts if isinstance(each, FrictionSum) else (each,)
+        parts += model.parts if isinstance(model, FrictionSum) else (model,)
     return FrictionSum(tuple(parts))
 
 
