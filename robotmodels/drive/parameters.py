@@ -20,13 +20,7 @@ from ..table_text import joints_text
 
 
 class DriveKind(Enum):
-    """One kind of drive parameters; those of coupled motors belong to the kind that they couple.
-
-    Examples
-    --------
-    >>> DriveKind.IA.value, DriveKind.IA.coupling
-    ('Ia', 'Iam')
-    """
+    """One kind of drive parameters; those of coupled motors belong to the kind that they couple."""
 
     IA = "Ia"
     FV = "Fv"
@@ -83,11 +77,6 @@ class DriveParameters(Value):
     Fv, Fc, offset : array_like, shape (n,), optional
         Viscous friction, N m s/rad or N s/m; Coulomb friction and constant torque or force, N m or
         N. Those left out are zero; give at least one.
-
-    Examples
-    --------
-    >>> DriveParameters(Fv=[1.0, 2.0]).Ia
-    array([0., 0.])
     """
 
     Ia: Array

@@ -78,12 +78,6 @@ class FrictionSum(Summable):
     ----------
     parts : tuple of Friction
         Models of the same joints, at least one.
-
-    Examples
-    --------
-    >>> from robotmodels.friction import CoulombFriction, ViscousFriction
-    >>> (ViscousFriction([1.0]) + CoulombFriction([2.0])).torque([3.0])
-    array([5.])
     """
 
     parts: tuple[Friction, ...]

@@ -37,12 +37,6 @@ class InertialParameters(Value):
     values : array_like, shape (f, 10)
         Rows ``XX XY XZ YY YZ ZZ MX MY MZ M``: inertia about the origin O_j in the axes of R_j
         (kg m^2; products with the sign of the tensor's entries), first moments (kg m), mass (kg).
-
-    Examples
-    --------
-    >>> link = InertialParameters([[0, 0, 0, 0.1, 0, 0.1, 0.5, 0, 0, 2.0]])
-    >>> link.mass, link.first_moments
-    (array([2.]), array([[0.5, 0. , 0. ]]))
     """
 
     values: Array

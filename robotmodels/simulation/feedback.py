@@ -10,7 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_core, as_exact, as_number
+from .._arrays import Array, as_core, as_exact
 from ..errors import InvalidValueError, ShapeError
 
 Law = Callable[[float, Array, Array, Array], Array]
@@ -150,13 +150,3 @@ def checked(law: Callable[..., Any], size: int, name: str) -> Callable[..., Arra
         return as_exact(answer, (size,), where)
 
     return value
-
-
-def sampling(period: ArrayLike | None, delay: ArrayLike) -> tuple[float | None, float]:
-    """Checked period and delay of a sampled controller, s."""
-    wait = as_number(delay, "delay", least=0.0)
-    if period is None:
-        if wait:
-            raise InvalidValueError("delay: only a sampled control is delayed; give period, too.")
-        return None, 0.0
-    return as_number(period, "period", above=0.0), wait

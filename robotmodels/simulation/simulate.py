@@ -17,7 +17,7 @@ from ..errors import InvalidValueError, ShapeError
 from ..friction import Friction, check_friction
 from ..model import RobotModel, check_model
 from .dry_friction import check_dissipates
-from .feedback import Feedback, StatefulControl, checked, sampling, stateful
+from .feedback import Feedback, StatefulControl, checked, stateful
 from .integration import Integration
 from .motion import Motion
 from .result import Integrator, Simulation
@@ -113,8 +113,7 @@ def simulate(
 
     References
     ----------
-    Book section 1.5 (direct dynamic model) and 1.5.1.4 (friction); E. Hairer, S. Noersett and
-    G. Wanner, "Solving ordinary differential equations I", 2nd ed., II.5 and II.6.
+    Book section 1.5 (direct dynamic model) and 1.5.1.4 (friction).
 
     Examples
     --------
@@ -141,11 +140,13 @@ def simulate(
     width = None if smoothing is None else as_each(smoothing, n, "smoothing", above=0.0)
     if (jumps := as_floats(breaks, "breaks")).ndim != 1:
         raise ShapeError(f"breaks: expected times of shape (K,), got {jumps.shape}.")
-    every, wait = sampling(period, delay)
-    if every is not None:
+    wait = as_number(delay, "delay", least=0.0)
+    if period is not None:
         given = jumps if times is None else np.concatenate([jumps, times])
-        law.sample((start, end), every, wait, given)
+        law.sample((start, end), as_number(period, "period", above=0.0), wait, given)
         knots = np.empty(0)
+    elif wait:
+        raise InvalidValueError("delay: only a sampled control is delayed; give period, too.")
     held = {*jumps.tolist(), *law.instants}
     inside = sorted(x for x in {*held, *knots, *tool_knots, *push_knots} if start < x < end)
     cuts = [(float(x), x in held) for x in (start, *inside, end)]
