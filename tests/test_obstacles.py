@@ -145,7 +145,7 @@ def test_mistakes_are_named_and_values_stay_read_only():
         (lambda: Box([0, 0, 0], [1, -1, 1]), InvalidValueError, "lower below upper"),
         (lambda: Box([-np.inf] * 3, [np.inf] * 3), InvalidValueError, "finite"),
         (lambda: clearance(arm, q, ["floor"]), InvalidValueError, r"obstacles\[0\]"),
-        (lambda: clearance(arm, q, [], [0.1, 0.1]), InvalidValueError, "radius"),
+        (lambda: clearance(arm, q, [], [0.1, 0.1]), ShapeError, "radius"),
         (lambda: clearance(arm, q, [], segments=[3]), InvalidValueError, "pairs"),
         (lambda: clearance(arm, q, [], segments=[(0, 99)]), FrameNotFoundError, "99"),
         (lambda: clearance(arm, np.zeros(5), []), ShapeError, "q"),
