@@ -127,9 +127,8 @@ def _rows_of_symbols(
     """Arguments of `rules.regrouped` as formulas, without the motion of the joint; the symbols."""
     import sympy
 
-    table, length = model.table, tolerance * rules.reach(model)
+    table, least = model.table, tolerance * rules.reach(model)
     constants: dict[str, Constant] = {}
-
     own = constant_names(table.symbols)
 
     def symbol(name: str, latex: str, value: float, unit: str) -> Any:
@@ -147,42 +146,40 @@ def _rows_of_symbols(
             angle = symbol(f"{letter}{j}", f"{_GREEK[letter]}_{{{j}}}", value, "rad")
         else:
             angle = sympy.pi * sympy.Rational(turns.numerator, turns.denominator)
-        T = np.array(sympy.eye(4), dtype=object)
+        R = np.array(sympy.eye(3), dtype=object)
         C, S = sympy.cos(angle), sympy.sin(angle)
         i, k = ((1, 2), (2, 0), (0, 1))[axis]
-        T[i, i], T[k, k], T[i, k], T[k, i] = C, C, -S, S
-        return T
+        R[i, i], R[k, k], R[i, k], R[k, i] = C, C, -S, S
+        return R
 
-    def shifted(axis: int, value: float, letter: str) -> Array:
-        T = np.array(sympy.eye(4), dtype=object)
-        if abs(value) > length:
-            T[axis, 3] = symbol(f"{letter}{j}", f"{letter}_{{{j}}}", value, "m")
-        return T
+    def length(value: float, letter: str) -> Any:
+        shown = abs(value) > least
+        return symbol(f"{letter}{j}", f"{letter}_{{{j}}}", value, "m") if shown else 0
 
     rows: list[rules.RowConstants] = []
     directions: list[Array] = []
-    spans = rules.motion_spans(model, tolerance)
+    spans, loads = rules.motion_spans(model, tolerance), rules.loads_of(model, tolerance)
     weight = float(np.linalg.norm(model.gravity))
     columns = (table.gamma, table.b, table.beta, table.alpha, table.d, table.theta, table.r)
     values = zip(*(column.tolist() for column in columns), strict=True)
-    loads = rules.loads_of(model, tolerance)
     for j, (load, row) in enumerate(zip(loads, values, strict=True), start=1):
         gamma, b, beta, alpha, d, theta, r = row
         sigma, span = table.sigma[j - 1], spans[j]
-        T = turned(2, gamma, "G") @ shifted(2, b, "BL") @ turned(1, beta, "B")
-        T = T @ turned(0, alpha, "A") @ shifted(0, d, "D")
+        R, P = turned(2, gamma, "G"), np.array([0, 0, length(b, "BL")], dtype=object)
+        R = R @ turned(1, beta, "B") @ turned(0, alpha, "A")
+        P = P + R[:, 0] * length(d, "D")
         if sigma != REVOLUTE:
-            T = T @ turned(2, theta, "TH")
+            R = R @ turned(2, theta, "TH")
         if sigma != PRISMATIC:
-            T = T @ shifted(2, r, "RL")
+            P = P + R[:, 2] * length(r, "RL")
         pull: Any = load
         if sigma == PRISMATIC and load and abs(abs(load) - weight) <= tolerance * weight:
             pull = symbol("G", "G", weight, "m/s^2") * (1 if load > 0 else -1)
-        rows.append(rules.RowConstants(T[:3, :3], T[:3, 3], pull))
+        rows.append(rules.RowConstants(R, P, pull))
         if sigma == REVOLUTE or span.rotations is not rules.RotationRank.ONE:
             e = np.array([sympy.Integer(round(float(c))) for c in span.direction], dtype=object)
         else:
-            e = directions[table.antecedent[j - 1] - 1] @ T[:3, :3]
+            e = directions[table.antecedent[j - 1] - 1] @ R
         directions.append(e)
     return rows, directions, list(constants.values())
 
