@@ -74,5 +74,5 @@ MUTATIONS = [
     Mutation("simulation: feedback", "a sampled state is a step ahead", "def tick(self, t",
         "x = self._state = self._next", "x, self._state = self._state, self._next", FEEDBACK),
     Mutation("simulation: feedback", "a delay rounds up to whole periods", "def sample(self, ends",
-        "1e-9 * period else rest", "1e-9 * period else period", FEEDBACK),
+        "rest if rest >= tolerance", "period if rest >= tolerance", FEEDBACK),
 ]  # fmt: skip
