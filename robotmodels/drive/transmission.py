@@ -85,12 +85,17 @@ class Transmission(Value):
 
     @classmethod
     def from_motor(
-        cls, matrix: ArrayLike, offset: ArrayLike | None = None, **terms: ArrayLike | None
+        cls,
+        matrix: ArrayLike,
+        offset: ArrayLike | None = None,
+        Iam: ArrayLike | None = None,
+        Fvm: ArrayLike | None = None,
+        Fcm: ArrayLike | None = None,
     ) -> Self:
         """The transmission of motors that turn as ``q_c = R q + r_0``: ``K = R^-1, q_0 = -K r_0``.
 
-        Row m of R (n, n) has the turns of motor m per turn of each joint; ``Iam``, ``Fvm`` and
-        ``Fcm`` as for the class.
+        Row m of R (n, n) has the turns of motor m per turn of each joint; other arguments as for
+        the class.
         """
         R = _square(matrix)
         n = len(R)
@@ -101,7 +106,7 @@ class Transmission(Value):
             )
         K = np.linalg.inv(R)
         zero = None if offset is None else -K @ as_exact(offset, (n,), "offset")
-        return cls(K, zero, **terms)
+        return cls(K, zero, Iam, Fvm, Fcm)
 
     @property
     def n(self) -> int:
