@@ -102,7 +102,7 @@ def poses_of(model, plan, q):
 
 def solved(plan, U):
     """Rows of the plan alone: joints (NaN where there is none) and what the kernel reports."""
-    q, residual, marks = plan.program.run(plan.program.numbers, U, np.zeros((len(U), plan.form.k)))
+    q, residual, marks = plan.program.run(U, np.zeros((len(U), plan.form.k)))
     there = np.arange(q.shape[1]) < marks[:, :1]
     assert np.where(there, residual, 0.0).max() <= 1e-9
     return np.where(there[..., None], q, np.nan), marks

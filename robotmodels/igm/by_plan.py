@@ -12,9 +12,8 @@ from .branches import branches
 from .closed_form import ClosedForm
 from .loop import JointChain
 from .motion import lever, random_postures, tool_poses
-from .paul import layout
 from .paul.plan import PaulPlan, derive_plan
-from .paul.program import ACCEPTED, SLACK, SMALL_AMPLITUDE, ZERO_AMPLITUDE, Program
+from .paul.program import SMALL_AMPLITUDE, ZERO_AMPLITUDE, Program
 from .postures import Postures, difference
 from .singular import solve_singular
 from .solver import Solver, Tolerances, postures
@@ -32,15 +31,10 @@ class ByPlan:
     """Arm whose regular poses are solved by Paul's plan."""
 
     plan: PaulPlan
+    program: Program
     family: Solver
     labels: tuple[str, ...]
     branch_of_way: NDArray[np.int16]
-
-    @property
-    def program(self) -> Program:
-        """The plan as the kernel reads it."""
-        assert self.plan.program is not None
-        return self.plan.program
 
     @property
     def most(self) -> int:
@@ -63,12 +57,12 @@ class ByPlan:
 def prepare_by_plan(chain: JointChain, family: Solver) -> ByPlan | None:
     """Derive the plan of an arm and test it."""
     plan = derive_plan(chain)
-    if plan.program is None or plan.program.branches > 16:
+    program = plan.program
+    if program is None or program.branches > 16:
         return None
     q = random_postures(chain, TESTS, np.random.default_rng(0))
-    rows, residual, marks = run(plan, plan.program.numbers, tool_poses(chain, q), q)
-    S = rows.shape[1]
-    sure = marks[:, 1] == 0
+    rows, residual, marks = program.run(tool_poses(chain, q), q)
+    S, sure = rows.shape[1], marks[:, 1] == 0
     there = (np.arange(S) < marks[:, :1]) & sure[:, None]
     rows[~there] = np.nan
     away = np.abs(difference(chain.sigma, rows, q[:, None])).max(axis=-1)
@@ -85,38 +79,21 @@ def prepare_by_plan(chain: JointChain, family: Solver) -> ByPlan | None:
     if not np.array_equal(table[ways], codes) or np.any(np.diff(apart, axis=1) == 0):
         # the sides of the family are not those of the plan: ranks serve both
         table, labels = np.empty(0, np.int16), tuple(str(i + 1) for i in range(S))
-    return ByPlan(plan, family, labels, read_only(table, np.int16))
-
-
-def run(
-    plan: PaulPlan,
-    numbers: Array,
-    poses: Array,
-    references: Array,
-    tolerances: tuple[float, ...] = (SLACK, ZERO_AMPLITUDE, SMALL_AMPLITUDE, ACCEPTED),
-) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Run a plan with other tolerances; shapes as in `Program.run`."""
-    assert plan.program is not None
-    at = int(plan.program.plan[layout.TOLERANCES])
-    numbers = np.array(numbers)
-    numbers[at : at + 4] = tolerances
-    return plan.program.run(numbers, poses, references)
+    return ByPlan(plan, program, family, labels, read_only(table, np.int16))
 
 
 @postures.register
 def _(solver: ByPlan, U: Array, references: Array, tolerances: Tolerances) -> Postures:
-    chain, plan = solver.chain, solver.plan
-    assert plan.program is not None
-    numbers = plan.program.numbers
+    chain = solver.chain
     slack = max(OVERSHOOT, tolerances.position / lever(chain), tolerances.orientation)
     limits = (slack, ZERO_AMPLITUDE, SMALL_AMPLITUDE, max(ROUGH, *tolerances))
 
     def candidates(
         poses: Array, wanted: Array
     ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
-        q, _, marks = run(plan, numbers, poses, wanted, limits)
+        q, _, marks = solver.program.run(poses, wanted, limits)
         there = np.arange(q.shape[1]) < marks[:, :1]
-        return q, there, free_joints(plan, marks[:, 2 : 2 + q.shape[1]], there)
+        return q, there, free_joints(solver.plan, marks[:, 2 : 2 + q.shape[1]], there)
 
     found = solve_singular(chain, candidates, U, references, tolerances)
     lost = np.flatnonzero(~found.valid.any(axis=1))

@@ -13,7 +13,7 @@ from ..chain import motion
 from .expressions import UNIT, ZERO, Expression, Graph, Kind, negative
 from .normal_form import NormalForm
 from .polynomials import Monomial, minus, plus, unknowns
-from .products import Fixed, Item, Motion, Rotation, product
+from .products import Fixed, Item, Motion, Rotation, product, turned
 from .unknowns import Joints
 
 SAMPLES = 7
@@ -111,9 +111,9 @@ class Arm:
         r = self._constant(f"RL{name}", f"RL_{{{name}}}", row.r, f"r{name}")
         X = [[UNIT, ZERO, ZERO], [ZERO, ca, negative(sa)], [ZERO, sa, ca]]
         turn = [[ct, negative(st), ZERO], [st, ct, ZERO], [ZERO, ZERO, UNIT]]
-        R = [[graph.sum(graph.product(X[i][m], turn[m][c]) for m in range(3)) for c in range(3)]
-             for i in range(3)]  # fmt: skip
-        return Fixed(R, [d, graph.product(negative(sa), r), graph.product(ca, r)])
+        return Fixed(
+            turned(X, turn, graph), [d, graph.product(negative(sa), r), graph.product(ca, r)]
+        )
 
     def _tool_matrix(self) -> Fixed | None:
         tool = self.form.tool

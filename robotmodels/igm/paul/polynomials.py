@@ -11,6 +11,7 @@ from .expressions import ONE, ZERO, Expression, Graph
 Monomial = tuple[int, ...]
 Polynomial = dict[Monomial, Expression] | None
 Vector = list[Polynomial]
+Gathered = dict[Monomial, list[Expression]]
 
 MOST_UNKNOWNS = 2
 
@@ -44,17 +45,13 @@ def plus(graph: Graph, *terms: Polynomial) -> Polynomial:
     kept = [t for t in terms if t is None or t]
     if len(kept) == 1:
         return kept[0]
-    gathered: dict[Monomial, list[Expression]] = {}
+    gathered: Gathered = {}
     for t in kept:
         if t is None:
             return None
         for monomial, e in t.items():
             gathered.setdefault(monomial, []).append(e)
-    out = {}
-    for monomial, parts in gathered.items():
-        e = parts[0] if len(parts) == 1 else graph.sum(parts)
-        if e[0]:
-            out[monomial] = e
+    out = _summed(graph, gathered)
     return out if len(unknowns(out)) <= MOST_UNKNOWNS else None
 
 
@@ -64,17 +61,17 @@ def times(graph: Graph, p: Polynomial, q: Polynomial) -> Polynomial:
         return {}
     if p is None or q is None or len(unknowns(p) | unknowns(q)) > MOST_UNKNOWNS:
         return None
-    gathered: dict[Monomial, list[Expression]] = {}
+    gathered: Gathered = {}
     for m, a in p.items():
         for n, b in q.items():
             monomial = tuple(sorted(m + n)) if m and n else m or n
             gathered.setdefault(monomial, []).append(graph.product(a, b))
-    out = {}
-    for monomial, parts in gathered.items():
-        e = parts[0] if len(parts) == 1 else graph.sum(parts)
-        if e[0]:
-            out[monomial] = e
-    return out
+    return _summed(graph, gathered)
+
+
+def _summed(graph: Graph, gathered: Gathered) -> dict[Monomial, Expression]:
+    out = {m: parts[0] if len(parts) == 1 else graph.sum(parts) for m, parts in gathered.items()}
+    return {monomial: e for monomial, e in out.items() if e[0]}
 
 
 def scaled(graph: Graph, e: Expression, p: Polynomial) -> Polynomial:

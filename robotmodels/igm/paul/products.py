@@ -14,6 +14,7 @@ from .polynomials import Vector, constant, minus, plus, scaled, times
 from .unknowns import Joints, JointSum
 
 Rotation = list[list[Expression]]
+IDENTITY: Rotation = [[UNIT if i == j else ZERO for j in range(3)] for i in range(3)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +36,7 @@ class Fixed:
     def inverse(self, graph: Graph) -> Fixed:
         """The inverse matrix."""
         R = [[self.R[j][i] for j in range(3)] for i in range(3)]
-        p = [graph.sum(negative(graph.product(R[i][j], self.p[j])) for j in range(3))
-             for i in range(3)]  # fmt: skip
+        p = [negative(graph.dot(*zip(row, self.p, strict=True))) for row in R]
         return Fixed(R, p, self.table)
 
 
@@ -53,46 +53,37 @@ class _Segment:
     carried: list[tuple[JointSum | None, Vector]]
 
 
-def _identity() -> Rotation:
-    return [[UNIT if i == j else ZERO for j in range(3)] for i in range(3)]
-
-
 def product(items: Sequence[Item], joints: Joints) -> list[Vector]:
     """The product of matrices as its four columns s, n, a, P of three polynomials each."""
     graph = joints.graph
-    columns: list[Vector] = [[constant(e) for e in row] for row in _identity()]
-    point: Vector = [{}, {}, {}]
+    columns: list[Vector] = [[constant(e) for e in row] for row in (*IDENTITY, [ZERO] * 3)]
     for segment in reversed(_segments(items, joints)):
         columns = [_turned(segment, segment.span, _mapped(segment.rotation, c, graph), joints)
                    for c in columns]  # fmt: skip
-        point = _turned(segment, segment.span, _mapped(segment.rotation, point, graph), joints)
         for span, vector in segment.carried:
             moved = _turned(segment, span, vector, joints)
-            point = [plus(graph, a, b) for a, b in zip(moved, point, strict=True)]
-    return [*columns, point]
+            columns[3] = [plus(graph, a, b) for a, b in zip(moved, columns[3], strict=True)]
+    return columns
 
 
 def _segments(items: Sequence[Item], joints: Joints) -> list[_Segment]:
     graph = joints.graph
-    out: list[_Segment] = []
-    now = _Segment(None, 1.0, _identity(), [])
+    out = [_Segment(None, 1.0, IDENTITY, [])]
     for item in items:
+        now = out[-1]
+        is_empty = not (now.span or now.carried) and now.rotation == IDENTITY
         if isinstance(item, Fixed):
-            if not item.table and (now.span or now.carried or now.rotation != _identity()):
+            if not item.table and not is_empty:
+                now = _Segment(None, 1.0, IDENTITY, [])
                 out.append(now)
-                now = _Segment(None, 1.0, _identity(), [])
             if any(e[0] for e in item.p):
                 vector: Vector = [constant(e) for e in item.p]
                 now.carried.append((now.span, _mapped(now.rotation, vector, graph)))
-            now.rotation = _times(now.rotation, item.R, graph)
+            now.rotation = turned(now.rotation, item.R, graph)
             continue
         if joints.row(item.joint).sigma:
-            slide: Vector = [
-                {},
-                {},
-                scaled(graph, (float(item.sign), 0), joints.length(item.joint)),
-            ]
-            now.carried.append((now.span, _mapped(now.rotation, slide, graph)))
+            along_z = scaled(graph, (float(item.sign), 0), joints.length(item.joint))
+            now.carried.append((now.span, _mapped(now.rotation, [{}, {}, along_z], graph)))
             continue
         group, place, sense = joints.group[item.joint]
         start, end = (place, place + 1) if item.sign > 0 else (place + 1, place)
@@ -101,11 +92,9 @@ def _segments(items: Sequence[Item], joints: Joints) -> list[_Segment]:
         if now.span is not None and parallel and now.span.group == group and now.span.b == start:
             now.span = JointSum(group, now.span.a, end)
             continue
-        if now.span or now.carried or now.rotation != _identity():
-            out.append(now)
         # sign: the sense of the group as the axes of this frame have it
-        now = _Segment(JointSum(group, start, end), sense, _identity(), [])
-    out.append(now)
+        segment = _Segment(JointSum(group, start, end), sense, IDENTITY, [])
+        out[len(out) - is_empty :] = [segment]
     return out
 
 
@@ -125,8 +114,7 @@ def _mapped(R: Rotation, v: Vector, graph: Graph) -> Vector:
     return [plus(graph, *(scaled(graph, e, p) for e, p in zip(row, v, strict=True))) for row in R]
 
 
-def _times(A: Rotation, B: Rotation, graph: Graph) -> Rotation:
-    return [
-        [graph.sum(graph.product(A[i][m], B[m][j]) for m in range(3)) for j in range(3)]
-        for i in range(3)
-    ]
+def turned(A: Rotation, B: Rotation, graph: Graph) -> Rotation:
+    """The product of two rotations."""
+    columns = list(zip(*B, strict=True))
+    return [[graph.dot(*zip(row, column, strict=True)) for column in columns] for row in A]

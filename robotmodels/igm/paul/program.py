@@ -28,6 +28,7 @@ SMALL_AMPLITUDE = 1e-4
 """Amplitudes beside their usual size below which a pose is left to a more careful method."""
 ACCEPTED = 1e-9
 """Largest error of a posture of the plan [m, rad]."""
+TOLERANCES = SLACK, ZERO_AMPLITUDE, SMALL_AMPLITUDE, ACCEPTED
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,13 +62,15 @@ class Program:
         return read_only(np.concatenate([numbers, labels]))
 
     def run(
-        self, numbers: Array, poses: Array, references: Array
+        self, poses: Array, references: Array, tolerances: Sequence[float] = TOLERANCES
     ) -> tuple[Array, Array, NDArray[np.int64]]:
         """Postures in the order of the tree, unchecked poses.
 
         Shapes: poses (N, 4, 4), references (N, k) -> q (N, S, k), residual (N, S),
         marks (N, 2 + 2 S): count, flags, bits of free unknowns, bits of branches.
         """
+        numbers, at = np.array(self.numbers), int(self.plan[layout.TOLERANCES])
+        numbers[at : at + 4] = tolerances
         (N, k), S = references.shape, self.branches
         q, residual = np.empty((N, S, k)), np.empty((N, S))
         marks = np.empty((N, 2 + 2 * S), np.int64)
@@ -198,7 +201,7 @@ def compile_plan(arm: Arm, steps: Sequence[Step]) -> Program:
     scales = [_scale(step, graph) for step in steps]
     numbers = [
         factors, table.initial, references, form.before[:3], form.after, form.lever, scales,
-        [SLACK, ZERO_AMPLITUDE, SMALL_AMPLITUDE, ACCEPTED], np.zeros(3 * form.k),
+        TOLERANCES, np.zeros(3 * form.k),
     ]  # fmt: skip
     spans = np.delete(np.cumsum([np.size(p) for p in numbers]), layout.LEVER - layout.INITIAL)
     branches, registers = int(reached[-1]), len(table.initial)

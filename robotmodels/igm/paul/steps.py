@@ -11,9 +11,8 @@ from ..._arrays import Array
 from .catalogue import Step, positive_sine
 from .equations import Split
 from .expressions import Expression, Kind, negative
-from .formulas import Page
 from .plan import PaulPlan
-from .types import EquationType
+from .types import EquationType, Page
 from .typeset import Typesetter, plain
 from .writer import Writer
 
