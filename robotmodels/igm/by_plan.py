@@ -107,8 +107,7 @@ def _(solver: ByPlan, U: Array, references: Array, tolerances: Tolerances) -> Po
 
 def is_degenerate(solver: ByPlan, U: Array, references: Array) -> NDArray[np.bool_]:
     """Poses at which an equation of the plan leaves its unknown free, or nearly so, (N,)."""
-    numbers = solver.program.numbers
-    return run(solver.plan, numbers, np.ascontiguousarray(U), references)[2][:, 1] != 0
+    return solver.program.run(np.ascontiguousarray(U), references)[2][:, 1] != 0
 
 
 def free_joints(
