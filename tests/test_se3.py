@@ -71,11 +71,6 @@ def test_skew_is_the_vector_product(seed):
     assert np.allclose((se3.skew(p) @ u[:, :, None])[:, :, 0], np.cross(p, u), atol=1e-15)
 
 
-def test_rotations_exact_to_rounding_are_untouched(rng):
-    T = random_pose(rng)
-    assert np.array_equal(se3.as_pose(T), T)
-
-
 @given(seeds, st.floats(1e-13, 2e-7))
 def test_slightly_off_rotations_are_projected(seed, size):
     """What leaves is a rotation to rounding, and as near as what came in was off."""
@@ -117,12 +112,6 @@ def test_what_is_not_a_pose_is_refused(spoil, words, rng):
         se3.as_single_pose(T[1], "base")
 
 
-@pytest.mark.parametrize("value", [np.eye(3), np.zeros((2, 4)), [1, 2], 5.0])
-def test_poses_of_another_shape_are_refused(value):
-    with pytest.raises(ShapeError, match=r"expected shape \(\.\.\., 4, 4\)"):
-        se3.as_pose(value)
-
-
 def test_pinocchio_poses_are_accepted(rng):
     pin = pytest.importorskip("pinocchio")
     M = pin.SE3(random_rotation(rng), rng.normal(size=3))
@@ -144,14 +133,15 @@ def test_pages_of_a_mat_file(tmp_path, rng):
 
 
 @pytest.mark.parametrize(
-    ("value", "words"),
+    ("read", "value", "words"),
     [
-        (np.zeros((5, 4, 4)), "use it as it is"),
-        (np.zeros((3, 3, 5)), "got shape"),
-        (np.zeros((4, 4, 2, 2)), "got shape"),
-        (np.zeros(16), "got shape"),
+        *((se3.as_pose, x, r"expected shape \(\.\.\., 4, 4\)")
+          for x in (np.eye(3), np.zeros((2, 4)), [1, 2], 5.0)),
+        (se3.poses_from_matlab, np.zeros((5, 4, 4)), r"MATLAB's order \(4, 4, N\).*use it as it is"),
+        *((se3.poses_from_matlab, np.zeros(x), "got shape")
+          for x in ((3, 3, 5), (4, 4, 2, 2), (16,))),
     ],
-)
-def test_other_shapes_are_no_pages(value, words):
-    with pytest.raises(ShapeError, match=rf"expected MATLAB's order \(4, 4, N\).*{words}"):
-        se3.poses_from_matlab(value)
+)  # fmt: skip
+def test_poses_of_another_shape_are_refused(read, value, words):
+    with pytest.raises(ShapeError, match=words):
+        read(value)

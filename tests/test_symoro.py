@@ -157,28 +157,21 @@ def test_what_is_added_to_the_variable_is_the_offset(two, entry, offset):
 
 
 @pytest.mark.parametrize(
-    ("theta", "values", "message"),
+    ("columns", "values", "message"),
     [
-        ("pi/2 - th1", None, "not its variable plus a constant"),
-        ("th1**2", None, "not its variable plus a constant"),
-        ("phi + psi", None, "which of phi, psi is the variable of joint 1"),
-        ("th1", {"th1": 0.3}, "take that one"),
-        ("r2", None, "already the variable of joint 1"),
+        ({"theta": ["pi/2 - th1", 0]}, None, "not its variable plus a constant"),
+        ({"theta": ["th1**2", 0]}, None, "not its variable plus a constant"),
+        ({"theta": ["phi + psi", 0]}, None, "which of phi, psi is the variable of joint 1"),
+        ({"theta": ["th1", 0]}, {"th1": 0.3}, "take that one"),
+        ({"theta": ["r2", 0]}, None, "already the variable of joint 1"),
+        *(({"d": [0, entry]}, None, r"robot\.par, line 1[0-9]: d") for entry in (
+            "", "__import__('os')", "[1]", "1 if 1 else 2", "exp(1)", "sqrt(1, 2)",
+            "(" * 300 + "1", "1/0", "(-8)**(1/3)", "9.0**9**9**9")),
     ],
-)
-def test_a_variable_keeps_its_sign_and_is_one(two, theta, values, message):
-    with pytest.raises(ParFileError, match=message):
-        two(values, theta=[theta, 0])
-
-
-@pytest.mark.parametrize(
-    "entry",
-    ["", "__import__('os')", "[1]", "1 if 1 else 2", "exp(1)", "sqrt(1, 2)", "(" * 300 + "1",
-     "1/0", "(-8)**(1/3)", "9.0**9**9**9"],
 )  # fmt: skip
-def test_entries_that_are_not_numbers(two, entry):
-    with pytest.raises(ParFileError, match=r"robot\.par, line 1[0-9]: d"):
-        two(d=[0, entry])
+def test_entries_that_are_no_variables_and_no_numbers(two, columns, values, message):
+    with pytest.raises(ParFileError, match=message):
+        two(values, **columns)
 
 
 # --- dynamic parameters, gravity, base -----------------------------------------------------------

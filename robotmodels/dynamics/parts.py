@@ -31,7 +31,6 @@ Examples
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -51,8 +50,9 @@ def mass_matrix(model: RobotModel, q: ArrayLike, drive: bool = True) -> Array:
     check_model(model)
     check_all_or_none(drive)
     q = as_vector(q, model.n, "q")
-    if (single := _single(model, q)) is not None:
-        upper = pin.crba(*single)
+    twin = model.twin
+    if q.ndim == 1 and twin.serves_dynamics:
+        upper = pin.crba(twin.model, twin.data(), twin.to_pin(q))
         M = _in_table_order(model, np.where(_upper_triangle(model.n), upper, upper.T))
     else:
         from ..kernels.mass import mass_matrices
@@ -70,8 +70,10 @@ def coriolis_matrix(model: RobotModel, q: ArrayLike, v: ArrayLike) -> Array:
     """
     check_model(model)
     q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
-    if (single := _single(model, q, v)) is not None:
-        return np.array(_in_table_order(model, pin.computeCoriolisMatrix(*single)), order="C")
+    twin = model.twin
+    if q.ndim == v.ndim == 1 and twin.serves_dynamics:
+        C = pin.computeCoriolisMatrix(twin.model, twin.data(), twin.to_pin(q), twin.to_pin(v))
+        return np.array(_in_table_order(model, C), order="C")
     from ..kernels.mass import coriolis_matrices
 
     return batched(coriolis_matrices, model, {"q": q, "v": v}, (model.n, model.n))
@@ -117,8 +119,10 @@ def gravity_torque(model: RobotModel, q: ArrayLike) -> Array:
     q = as_vector(q, model.n, "q")
     if model.twin.torques_warn:
         warn_without_masses(model)
-    if (single := _single(model, q)) is not None:
-        return model.twin.from_pin(pin.computeGeneralizedGravity(*single))
+    twin = model.twin
+    if q.ndim == 1 and twin.serves_dynamics:
+        g = pin.computeGeneralizedGravity(twin.model, twin.data(), twin.to_pin(q))
+        return twin.from_pin(g)
     zero = np.zeros(model.n)
     return rigid_torques(model, q, zero, zero)
 
@@ -131,8 +135,10 @@ def kinetic_energy(model: RobotModel, q: ArrayLike, v: ArrayLike, drive: bool = 
     check_model(model)
     check_all_or_none(drive)
     q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
-    if (single := _single(model, q, v)) is not None:
-        energy = np.float64(pin.computeKineticEnergy(*single))
+    twin = model.twin
+    if q.ndim == v.ndim == 1 and twin.serves_dynamics:
+        x, dx = twin.to_pin(q), twin.to_pin(v)
+        energy = np.float64(pin.computeKineticEnergy(twin.model, twin.data(), x, dx))
     else:
         energy = _energies(model, q, v)[..., 0].copy()
     if drive and (drives := model.drive_matrices) is not None:
@@ -148,17 +154,11 @@ def potential_energy(model: RobotModel, q: ArrayLike) -> Array:
     check_model(model)
     q = as_vector(q, model.n, "q")
     # Pinocchio leaves out bodies that are fixed to the base
-    if (single := _single(model, q)) is not None and model.twin.base_is_massless:
-        return np.asarray(pin.computePotentialEnergy(*single), dtype=np.float64)
-    return _energies(model, q, np.zeros(model.n))[..., 1].copy()
-
-
-def _single(model: RobotModel, *vectors: Array) -> Any:
-    """Arguments of a function of Pinocchio for one sample; None where it does not serve."""
     twin = model.twin
-    if not twin.serves_dynamics or any(x.ndim != 1 for x in vectors):
-        return None
-    return twin.model, twin.data(), *map(twin.to_pin, vectors)
+    if q.ndim == 1 and twin.serves_dynamics and twin.base_is_massless:
+        energy = pin.computePotentialEnergy(twin.model, twin.data(), twin.to_pin(q))
+        return np.asarray(energy, dtype=np.float64)
+    return _energies(model, q, np.zeros(model.n))[..., 1].copy()
 
 
 def _in_table_order(model: RobotModel, M: Array) -> Array:
