@@ -5,10 +5,26 @@ Book sections 4.2 to 4.4. Every generator of joint motion returns a `Trajectory`
 Inconsistent or infeasible requests raise `ShapeError` or `InvalidValueError`, whose message gives
 the least duration, limit or factor that is feasible.
 
-Common parameters: ``limits``, `MotionLimits` of the joints; ``torque`` (n,) or a number,
-largest torques in both directions, N m or N, by default those of the model's table; ``rng``, random
-numbers or their seed, by default a fixed one; ``law`` and ``synchronisation``, members of `TimeLaw`
-and `Synchronisation` or their names; ``duration``, seconds, by default the least.
+Parameters
+----------
+model : RobotModel
+    The robot, n joints, with its drives.
+q0, q1 : array_like, shape () or (n,)
+    Positions at the ends, rad or m.
+v0, v1, a0, a1 : array_like, shape () or (n,)
+    Velocities and accelerations at the ends, rad or m, per s and s^2.
+duration : float, optional
+    Seconds, by default the least; a longer one slows the quickest motion down evenly.
+limits : MotionLimits, optional
+    Of the joints, kept everywhere on the motion.
+law : TimeLaw or str
+    A member or its name.
+synchronisation : Synchronisation or str
+    How the joints are kept in step.
+torque : array_like, shape () or (n,), optional
+    Largest torques in both directions, N m or N; default those of the model's table.
+rng : Generator or int, optional
+    Random numbers or their seed; default a fixed one.
 """
 
 from .. import _docs

@@ -48,11 +48,6 @@ def blended_lines(
     smooth : bool
         Whether the blends keep the acceleration continuous.
 
-    Returns
-    -------
-    Trajectory
-        Of n joints, or scalar.
-
     References
     ----------
     Khalil and Dombre, Modeling, identification and control of robots, section 13.5. J. Craig,

@@ -222,15 +222,10 @@ def random_profile(
 
     Parameters
     ----------
-    q0, q1, nodes : array_like, shape () or (n,), and int
-        Configurations at the ends, rad or m, and number of free ones between them.
-    law, rng
+    nodes : int
+        Number of free configurations between the ends.
+    law : ProfileLaw or str
         ``"spline"``, ``"trapezoid"`` (which passes the nodes at a distance) or ``"quintic"``.
-
-    Returns
-    -------
-    Trajectory
-        Of 1 s, scalar for numbers; `time_scaled` gives it the least duration.
 
     Examples
     --------

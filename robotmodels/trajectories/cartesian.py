@@ -6,16 +6,9 @@ T0, T1 : array_like, shape (4, 4)
     First and last pose, m.
 poses : array_like, shape (m, 4, 4)
     Corners of `blended_poses`, at least two, m.
-duration, law
-    As for joints.
 limits : MotionLimits, optional
     Of translation in m, then of rotation in rad, for instance ``MotionLimits([0.5, 1.0],
     [2.0, 4.0])``; they bound the lengths of the vectors of velocity, acceleration and jerk.
-
-Returns
--------
-PoseTrajectory
-    The motion, from rest to rest.
 
 References
 ----------
@@ -69,8 +62,12 @@ def cartesian_trajectory(
 
     Also called ``ctraj`` (`TimeLaw.LINEAR`: ``trinterp``). The position moves on a line, the
     orientation turns about one fixed axis by the shorter way (slerp), both by the same law, by
-    default a trapezoid of velocity whose ramps take a third of the time each. Returns N poses
-    (N, 4, 4), both ends included; a single one is ``T0``.
+    default a trapezoid of velocity whose ramps take a third of the time each.
+
+    Returns
+    -------
+    ndarray, shape (N, 4, 4)
+        Both ends included; a single one is ``T0``.
 
     Examples
     --------

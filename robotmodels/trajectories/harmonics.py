@@ -107,11 +107,6 @@ def fourier(
     a, b, mean, period, periods
         As for `FourierSeries`; a and b (H,) for a scalar motion.
 
-    Returns
-    -------
-    Trajectory
-        Of n joints, or scalar.
-
     References
     ----------
     Book section 1.6.2.3. J. Swevers, C. Ganseman, D. Tukel, J. De Schutter, H. Van Brussel,

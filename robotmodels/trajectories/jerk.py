@@ -52,18 +52,9 @@ def jerk_limited(
 
     Parameters
     ----------
-    q0, q1, v0, v1, a0, a1 : array_like, shape () or (n,)
-        Positions, velocities and accelerations at the ends, rad or m, per s and s^2.
     limits : MotionLimits
         All but that of jerk may be infinite. Where an end moves, the smaller limit of jerk counts
         both ways.
-    duration, synchronisation
-        See `robotmodels.trajectories`.
-
-    Returns
-    -------
-    Trajectory
-        Of n joints, or scalar.
 
     References
     ----------

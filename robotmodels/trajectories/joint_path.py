@@ -92,8 +92,6 @@ def joint_path(
 
     Parameters
     ----------
-    model
-        The robot, n joints.
     poses, t : PoseTrajectory or array_like, shape (N, 4, 4); array_like, shape (N,), optional
         World poses of the tool, m; times of an array, s, for its velocities.
     q_start : array_like, shape (n,), optional
@@ -107,11 +105,6 @@ def joint_path(
         As in `igm`.
     singular_below : float
         Conditioning below which a position is reported as singular.
-
-    Returns
-    -------
-    JointPath
-        Postures, velocities and events.
 
     References
     ----------

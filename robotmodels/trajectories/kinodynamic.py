@@ -137,8 +137,6 @@ def kinodynamic(
 
     Parameters
     ----------
-    model, limits, torque, rng
-        The robot, n joints, with its drives; see `robotmodels.trajectories` for the others.
     q0, q1, via : array_like, shape (n,), or Pose; via a sequence of these
         The ends, rad or m, and configurations on the way, in this order. Of a pose the planner
         chooses the posture.
@@ -156,11 +154,6 @@ def kinodynamic(
         seed differ only where the clock ends it.
     progress : bool or callable, optional
         A function is called with the fraction done; True writes it to the log (`logging`).
-
-    Returns
-    -------
-    Plan
-        The motion, or why there is none.
 
     Examples
     --------

@@ -5,26 +5,8 @@ Every function of this file returns the motion by one law. ``linear``, ``bang_ba
 configurations; ``cubic`` and ``quintic`` may have other states at their ends, which give every
 joint its own polynomial of the same duration.
 
-Parameters
-----------
-law : TimeLaw or str
-    Of `along_line`: a member or its name.
-q0, q1 : array_like, shape () or (n,)
-    Positions at the ends, rad or m.
-duration : float, optional
-    A longer one than the least slows the quickest motion down evenly.
-limits : MotionLimits, optional
-    Kept inside the motion; they may be asymmetric. Coordinated joints share the law that none of
-    them exceeds; where independent joints arrive early the end of their law is inside the motion.
-synchronisation : Synchronisation or str
-    How the joints are kept in step.
-v0, v1, a0, a1 : array_like, shape () or (n,)
-    Velocities and accelerations at the ends, rad or m, per s and s^2.
-
-Returns
--------
-Trajectory
-    Of n joints, or scalar.
+Limits may be asymmetric. Coordinated joints share the law that none of them exceeds; where
+independent joints arrive early the end of their law is inside the motion.
 
 References
 ----------
@@ -194,12 +176,8 @@ def joint_trajectory(
 
     Parameters
     ----------
-    q0, q1 : array_like, shape () or (n,)
-        First and last postures, rad or m.
     N : int or array_like, shape (N,)
         How many samples, equally spaced over one second; or their times, s, ascending.
-    v0, v1 : array_like, shape () or (n,)
-        Velocities at the ends, rad/s or m/s.
 
     Returns
     -------

@@ -74,8 +74,8 @@ def resolved_motion(
 
     Parameters
     ----------
-    model, poses
-        The robot, n joints, and a motion of its tool: `straight_line`, `circle` ...
+    poses : PoseTrajectory
+        A motion of the tool: `straight_line`, `circle` ...
     q_start : array_like, shape (n,)
         Posture to begin with, rad or m; it need not be on the trajectory.
     samples : int
@@ -84,11 +84,6 @@ def resolved_motion(
         Rate at which errors die out, 1/s; at most one over the time of a step.
     mask, method, joint_weights, secondary, augmented, tasks, limits
         As in `ikm`, world axes; the step of the limits is that of the motion.
-
-    Returns
-    -------
-    ResolvedMotion
-        Postures, velocities, and how far the tool is behind.
 
     References
     ----------

@@ -5,23 +5,12 @@ Parameters
 points : array_like, shape (m,) or (m, n)
     Positions, rad or m, at least two.
 times : array_like, shape (m,), optional
-    Times of the points, s, ascending from 0. Without them each interval is in proportion to the
-    time that its slowest joint needs at full velocity, and the whole is as quick as the limits
-    allow.
-limits : MotionLimits, optional
-    Kept everywhere on the motion.
-v0, v1, a0, a1 : array_like, shape () or (n,)
-    Velocities and accelerations at the ends, rad or m, per s and s^2. Other than zero, they need
-    times.
+    Times of the points, s, ascending from 0; needed with rates at the ends. Without them each
+    interval is in proportion to the time that its slowest joint needs at full velocity, and the
+    whole is as quick as the limits allow.
 ends : SplineEnds or str
     Conditions at the ends of a cubic spline (``v0`` and ``v1`` of a clamped one); a member or its
     name.
-
-Returns
--------
-Trajectory
-    Of n joints, or scalar.
-
 """
 
 from __future__ import annotations

@@ -99,8 +99,6 @@ def time_optimal(
         n joints, continuous in direction, or poses (which need ``model``, see `joint_path`).
     limits : MotionLimits
         Of velocity, acceleration and position; a limit of jerk is treated as ``torque_rate``.
-    model, torque
-        The robot, for limits of torque; see `robotmodels.trajectories`.
     torque_rate : array_like, shape () or (n,), optional
         Greatest rates of the torques, N m/s or N/s, without jumps of dry friction. The motion is
         then a local optimum that keeps them within 1 %.
@@ -110,11 +108,6 @@ def time_optimal(
         Number of intervals of the grid.
     start_rate, end_rate : float
         Rate of the path's own parameter at the ends, not negative.
-
-    Returns
-    -------
-    TimedPath
-        The motion, or why there is none.
 
     References
     ----------

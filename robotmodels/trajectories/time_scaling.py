@@ -75,13 +75,6 @@ def time_scaled(
     ----------
     trajectory : Trajectory
         The profile, n joints; its own duration does not matter.
-    model, torque, limits
-        The robot with its drives, and what the motion keeps.
-
-    Returns
-    -------
-    ScaledTrajectory
-        The motion, or why there is none, and the windows.
 
     References
     ----------

@@ -32,10 +32,6 @@ path, loop : bool
     workspace to draw, ``xmin, xmax, ymin, ymax, zmin, zmax`` in world axes, m; grid (bool): whether
     the floor z = 0 and the axes of the world are drawn; view; height (int); dark (bool).
 
-Returns
--------
-Scene
-
 Examples
 --------
 >>> from robotmodels.geometry import DHTable
