@@ -10,6 +10,8 @@ Parameters
 ----------
 **look : title (str), size (array_like, shape (2,))
     Of every figure: a text over it, its width and height in inches.
+**options
+    Of scenes, as for `show`.
 model : RobotModel
     The robot of n joints, whose names and units of joints are used.
 names, units : sequences of str, n each, optional

@@ -4,8 +4,6 @@ Parameters
 ----------
 result, selected : CalibrationResult and SelectedConfigurations
     Of `calibration.fit` and `calibration.select_configurations`.
-view, **look
-    See `robotmodels.viz`.
 level : float
     Probability of the intervals.
 truth : array_like, shape (P,), or mapping of str to float, optional

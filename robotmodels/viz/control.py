@@ -10,8 +10,6 @@ walls : SpringWall or sequence of SpringWall
     Walls that are drawn.
 length : float, optional
     Length of the arrow of the largest force, m; default some part of the scene.
-**look, **options
-    ``title`` and ``size``, see `robotmodels.viz`; options as for `animate`.
 
 Returns
 -------

@@ -8,8 +8,8 @@ q, e : array_like, shape (..., n) and (..., m), optional
     Configurations, drawn over each other; default zero. Of `plot_frequencies` the other joints.
 scale : float
     Factor by which deflections are exaggerated.
-grid, height, **look
-    Whether the floor and the axes of the world are drawn; see `robotmodels.viz`.
+grid : bool
+    Whether the floor and the axes of the world are drawn.
 joint, span : int and array_like, shape (2,)
     Which joint moves, from 0, and its range, rad or m.
 joints : str

@@ -6,8 +6,6 @@ result, found : IdentificationResult and ExcitingTrajectory
     Of `identification.fit` and `identification.excitation.exciting_trajectory`.
 test : Log, optional
     Held-out log of the same joints.
-**look
-    See `robotmodels.viz`.
 
 Returns
 -------

@@ -14,8 +14,6 @@ workspace : PlatformWorkspace
     From `parallel.workspace`, planar or a section.
 title : str, optional
     Of the page; default the family.
-height, dark, **look
-    See `robotmodels.viz`.
 
 Returns
 -------

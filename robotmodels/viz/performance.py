@@ -12,8 +12,6 @@ path, joint : FeasiblePath, and int, optional
     From `feasible_path`; column of q, default the one whose postures differ most.
 q : array_like, shape (n,), optional
     Configuration of the robot, default zero.
-**look, **options
-    ``title`` and ``size``, see `robotmodels.viz`; options as for `show`.
 
 Returns
 -------

@@ -6,8 +6,6 @@ run : ServoMotion
     Result of `servo`.
 model : RobotModel, optional
     The robot of the run; it moves, and a camera on its tool moves with it.
-height, dark, **look
-    See `robotmodels.viz`.
 
 Returns
 -------
