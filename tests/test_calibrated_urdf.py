@@ -272,6 +272,8 @@ def test_what_the_text_cannot_hold_is_warned_of(rng):
     robot = calibrated(model, rng, gains=True, eccentricity=True, compliance="joints")
     with pytest.warns(UrdfWarning, match=r"Gains.*Eccentricity.*Compliance"):
         calibrated_urdf(robot)
+    with pytest.warns(UrdfWarning, match=r"tilt .* gravity, \[0\.098"):
+        calibrated_urdf(calibrated(model.with_gravity([0.0981, 0.0, -9.81]), rng))
     geared = model.with_transmission(rm.Transmission(np.diag(np.full(model.n, 0.01))))
     with pytest.warns(UrdfWarning, match="transmission"):
         calibrated_urdf(calibrated(geared, rng))

@@ -167,7 +167,7 @@ def test_the_unit_of_length_does_not_change_anything():
         return result.names, contact.names, result.status, np.linalg.norm(left)
 
     for small, large, prior in (
-        *((1.0, unit, calibration.ParameterPrior) for unit in (1e-6, 1e6)), (1e-6, 1e-3, None),
+        *((1.0, unit, calibration.ParameterPrior) for unit in (1e-6, 1e6)), (1e-6, 1e-3, None), (1e2, 1e5, None),
     ):  # fmt: skip
         (*one, left), (*other, other_left) = (
             fitted(size, prior(length=1e-3 * size) if prior else calibration.ParameterPrior())

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import permutations
 from math import exp, log
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +15,6 @@ from ..geometry import REVOLUTE
 from ..kinematics import dgm
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel
-from .extended_table import Frame
 from .measurements import (
     CameraPose,
     Distance,
@@ -158,49 +156,33 @@ def beyond_limits(model: RobotModel, q: Array, rows: set[int]) -> tuple[list[str
 # --- units of lengths -----------------------------------------------------------------------------
 
 
-class UnitError(NamedTuple):
-    """Ratio of measured to nominal lengths explained by the actual and the assumed unit."""
-
-    unit: str
-    taken: str
-    ratio: float
-
-    @property
-    def sentence(self) -> str:
-        """Text of the message."""
-        text = f"{self.ratio:.4g} times what the robot's nominal geometry gives"
-        if self.taken == "metres":
-            return f"{text}; these look like {self.unit}"
-        return f"{text}, as if {self.unit} had been converted as {self.taken}"
-
-    @property
-    def factor(self) -> float:
-        """Factor that corrects the numbers."""
-        return 1.0 / _SLIPS[self.unit, self.taken]
+def _slip(pair: tuple[str, str], ratio: float) -> tuple[str, float]:
+    """Sentence on lengths of a unit that were taken for another, and the factor that mends them."""
+    unit, taken = pair
+    looks = f", as if {unit} had been converted as {taken}"
+    looks = f"; these look like {unit}" if taken == "metres" else looks
+    text = f"{ratio:.4g} times what the robot's nominal geometry gives{looks}"
+    return text, 1.0 / _SLIPS[pair]
 
 
-def _unit_error_of(ratio: float, near: float = _NEAR) -> UnitError | None:
-    """The unit error whose factor is near a ratio of measured to nominal lengths."""
+def _slip_of(ratio: float, near: float = _NEAR) -> tuple[str, float] | None:
+    """The slip whose factor is near a ratio of measured to nominal lengths."""
     if not 0.0 < ratio < np.inf:
         return None
     pair = min(_SLIPS, key=lambda key: abs(log(ratio / _SLIPS[key])))
-    close = abs(log(ratio / _SLIPS[pair])) < log(1.0 + near)
-    return UnitError(*pair, ratio) if close else None
+    return _slip(pair, ratio) if abs(log(ratio / _SLIPS[pair])) < log(1.0 + near) else None
 
 
-def _unit_error(
-    model: RobotModel, frame: Frame, pairs: Iterable[tuple[Array, Array]], size: float
-) -> UnitError | None:
-    """Unit error of proportional nominal and measured lengths, else of a size over the reach."""
+def _slip_between(pairs: Iterable[tuple[Array, Array]]) -> tuple[str, float] | None:
+    """The slip of nominal and measured lengths that are proportional."""
     for nominal, measured in pairs:
         square = float((nominal * nominal).sum())
         ratio = float((nominal * measured).sum()) / square if square > 0.0 else 0.0
         left = float(np.linalg.norm(measured - ratio * nominal))
-        error = _unit_error_of(ratio)
-        if error is not None and left < _ALIKE * float(np.linalg.norm(measured)):
-            return error
-    ratio = size / characteristic_length(model, frame)
-    return UnitError("millimetres", "metres", ratio) if ratio > _SPREAD else None
+        slip = _slip_of(ratio)
+        if slip is not None and left < _ALIKE * float(np.linalg.norm(measured)):
+            return slip
+    return None
 
 
 def _aligned(nominal: Array, measured: Array) -> tuple[Array, Array]:
@@ -228,11 +210,14 @@ def check_units(model: RobotModel, measurements: Sequence[Measurement]) -> None:
     """Refuse lengths in another unit than metres."""
     points: dict[str, list[Array]] = {}
     for k, m in enumerate(measurements):
-        quantity, error = _error_of(model, m)
-        if error is not None:
+        quantity, pairs, size = _lengths_of(model, m)
+        slip = _slip_between(pairs)
+        if slip is None and size > _SPREAD:
+            slip = _slip(("millimetres", "metres"), size)
+        if slip is not None:
             raise InvalidValueError(
-                f"measurements[{k}] ({m.name}): {quantity} are {error.sentence}. Pass metres: "
-                f"multiply by {error.factor:.4g}."
+                f"measurements[{k}] ({m.name}): {quantity} are {slip[0]}. Pass metres: multiply by "
+                f"{slip[1]:.4g}."
             )
         if isinstance(m, PointContact):
             for label, p in zip(m.label, dgm(model, m.q, m.frame)[:, :3, 3], strict=True):
@@ -242,35 +227,34 @@ def check_units(model: RobotModel, measurements: Sequence[Measurement]) -> None:
             _check_distance(m, np.array(points[m.point]), np.array(points[m.other]))
 
 
-def _error_of(model: RobotModel, m: Measurement) -> tuple[str, UnitError | None]:
-    """The measured quantity and its unit error, if there is one."""
+def _lengths_of(model: RobotModel, m: Measurement) -> tuple[str, list[tuple[Array, Array]], float]:
+    """The measured quantity, nominal and measured lengths, and their size by the reach or 0."""
+    none: list[tuple[Array, Array]] = []
     if not isinstance(m, Pose | Position | CameraPose | RelativePose | Distance):
-        return "", None
+        return "", none, 0.0
     T = dgm(model, m.q, m.frame)
-    p = T[:, :3, 3]
+    p, reach = T[:, :3, 3], characteristic_length(model, m.frame)
     if isinstance(m, Distance):
         if m.offset:
-            return "", None
+            return "", none, 0.0
+        groups = (m.groups == k for k in range(len(m.labels)))
+        pairs = [_from_pivot(p[one], m.length[one]) for one in groups]
         if m.q_other is not None:
             other = dgm(model, m.q_other, m.frame)[:, :3, 3]
             pairs = [(np.linalg.norm(p - other, axis=1), m.length)]
-        else:
-            groups = (m.groups == k for k in range(len(m.labels)))
-            pairs = [_from_pivot(p[one], m.length[one]) for one in groups]
-        return "lengths", _unit_error(model, m.frame, pairs, float(np.median(m.length)))
+        return "lengths", pairs, float(np.median(m.length)) / reach
     if not all(m.rows[:3]):
-        return "", None
+        return "", none, 0.0
     if isinstance(m, Position | Pose):
         measured = m.p if isinstance(m, Position) else m.T[:, :3, 3]
-        spread = float(np.linalg.norm(np.ptp(measured, axis=0)))
-        return "positions", _unit_error(model, m.frame, [_aligned(p, measured)], spread)
+        spread = float(np.linalg.norm(np.ptp(measured, axis=0))) / reach
+        return "positions", [_aligned(p, measured)], spread
     if isinstance(m, RelativePose):
         moved = se3.inverse(T) @ dgm(model, m.q_other, m.frame)
-        pairs = [(moved[:, :3, 3], m.T[:, :3, 3])]
-        return "displacements", _unit_error(model, m.frame, pairs, 0.0)
+        return "displacements", [(moved[:, :3, 3], m.T[:, :3, 3])], 0.0
     seen = se3.inverse(m.T)[:, :3, 3]
     pairs = [_aligned(p[m.groups == k], seen[m.groups == k]) for k in range(len(m.labels))]
-    return "positions of the boards", _unit_error(model, m.frame, pairs if all(m.rows) else [], 0.0)
+    return "positions of the boards", pairs if all(m.rows) else none, 0.0
 
 
 def _check_distance(m: KnownDistance, one: Array, other: Array) -> None:
@@ -282,9 +266,9 @@ def _check_distance(m: KnownDistance, one: Array, other: Array) -> None:
         return
     # halfway to the next factor, that of inches, if the nominal robot is no better
     near = min(_NEAR + scatter / max(apart, 1e-12), exp(0.5 * log(39.37 / 25.4)) - 1.0)
-    error = _unit_error_of(m.length / max(apart, 1e-12), near)
-    if error is not None:
+    slip = _slip_of(m.length / max(apart, 1e-12), near)
+    if slip is not None:
         raise InvalidValueError(
-            f"{m.name} {m.point} to {m.other}: {m.length:.6g} m is {error.sentence}. The nominal "
-            f"robot gives {apart:.4g} m. Pass metres: {error.factor * m.length:.5g}."
+            f"{m.name} {m.point} to {m.other}: {m.length:.6g} m is {slip[0]}. The nominal "
+            f"robot gives {apart:.4g} m. Pass metres: {slip[1] * m.length:.5g}."
         )

@@ -6,6 +6,7 @@ from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from .. import se3
 from .._arrays import Array
@@ -15,9 +16,8 @@ from ..geometry import FIXED, DHTable
 from ..inertia import InertialParameters
 from ..model import RobotModel, check_model
 from ..urdf import NamedFrame
-from .extended_table import base_parameters_of
+from .extended_table import Element, base_parameters_of
 
-_COLUMNS = ("gamma", "b", "beta", "alpha", "d", "theta", "r")
 _SAME_GRAVITY = 1e-6
 
 
@@ -79,17 +79,16 @@ def combine_arms(
         ends = [NamedFrame("tool", robot.tip, robot.tool), *robot.frames]
         ends += [NamedFrame("base", 0, np.eye(4))] if prefix == a else []
         for frame in ends:
-            name = _free(f"{prefix}_{frame.name}", taken)
             # R_0 of the second robot is the frame that it stands on
+            name = _free(f"{prefix}_{frame.name}", taken)
             frames.append(replace(frame, name=name, parent=frame.parent + up))
     bodies = model_a.inertia.values, np.zeros((len(rows), 10)), model_b.inertia.values
-    common = model_a.configurations.keys() & model_b.configurations.keys()
+    drives = _joined(model_a.drive, model_b.drive, [x.name for x in fields(DriveParameters)])
+    postures = model_a.configurations, model_b.configurations
     whole = RobotModel.from_table(
         table,
         inertia=InertialParameters(np.vstack(bodies)),
-        drive=DriveParameters(
-            **_joined(model_a.drive, model_b.drive, [x.name for x in fields(DriveParameters)])
-        ),
+        drive=DriveParameters(**drives),
         base=model_a.base,
         tool=model_a.tool,
         tip=model_a.tip,
@@ -97,17 +96,15 @@ def combine_arms(
         transmission=_transmission(model_a, model_b),
         name=f"{model_a.name}_{model_b.name}",
         configurations={
-            key: np.concatenate([q, model_b.configurations[key]])
-            for key, q in model_a.configurations.items()
-            if key in common
+            key: np.concatenate([q, postures[1][key]])
+            for key, q in postures[0].items()
+            if key in postures[1]
         },
     )
     moved = (replace(visual, frame=visual.frame + shift) for visual in model_b.visuals)
+    notes = (f"{x}: {note}" for x, m in ((a, model_a), (b, model_b)) for note in m.notes)
     return replace(
-        whole,
-        frames=tuple(frames),
-        visuals=(*model_a.visuals, *moved),
-        notes=(*(f"{a}: {n}" for n in model_a.notes), *(f"{b}: {n}" for n in model_b.notes)),
+        whole, frames=tuple(frames), visuals=(*model_a.visuals, *moved), notes=tuple(notes)
     )
 
 
@@ -120,38 +117,28 @@ def _table(
     first: DHTable, second: DHTable, stand: list[Array], prefixes: tuple[str, str]
 ) -> DHTable:
     """Rows of the first table, of the stand of the second robot, and of the second table."""
-    a, b = prefixes
     count = len(stand)
-    shift = first.f + count
-    names_a, names_b = [f"{a}_{x}" for x in first.names], [f"{b}_{x}" for x in second.names]
-    taken = {*names_a, *names_b}
-    standing = [_free(f"{b}_{name}", taken) for name in ("turn", "base")[-count:]]
+    names = [[f"{x}_{name}" for name in t.names]
+             for x, t in zip(prefixes, (first, second), strict=True)]  # fmt: skip
+    taken = {*names[0], *names[1]}
+    standing = [_free(f"{prefixes[1]}_{name}", taken) for name in ("turn", "base")[-count:]]
+    between = {element.word: [row[element] for row in stand] for element in Element}
+    between |= {"sigma": [FIXED] * count, "mu": [0] * count}
+    between["antecedent"] = [0, *range(first.f + 1, first.f + count)]
     columns: dict[str, Any] = {
-        word: np.concatenate(
-            [getattr(first, word), [row[k] for row in stand], getattr(second, word)]
-        )
-        for k, word in enumerate(_COLUMNS)
+        word: np.concatenate([getattr(first, word), rows, getattr(second, word)])
+        for word, rows in between.items()
     }
-    chain = [0, *range(first.f + 1, shift)]
-    return DHTable(
-        antecedent=np.concatenate([first.antecedent, chain, second.antecedent + shift]),
-        sigma=np.concatenate([first.sigma, [FIXED] * count, second.sigma]),
-        mu=np.concatenate([first.mu, [0] * count, second.mu]),
-        names=[*names_a, *standing, *names_b],
-        **columns,
-        **_joined(first, second, ("lower", "upper", "velocity", "effort")),
-    )
+    columns["antecedent"][-second.f :] += first.f + count
+    limits = _joined(first, second, ("lower", "upper", "velocity", "effort"))
+    return DHTable(names=[*names[0], *standing, *names[1]], **columns, **limits)
 
 
-def _transmission(model_a: RobotModel, model_b: RobotModel) -> Transmission | None:
-    if model_a.transmission is None and model_b.transmission is None:
+def _transmission(*models: RobotModel) -> Transmission | None:
+    if all(m.transmission is None for m in models):
         return None
-    one, other = (
-        Transmission(np.eye(m.n)) if m.transmission is None else m.transmission
-        for m in (model_a, model_b)
-    )
-    K = np.zeros((one.n + other.n, one.n + other.n))
-    K[: one.n, : one.n], K[one.n :, one.n :] = one.matrix, other.matrix
+    one, other = (m.transmission or Transmission(np.eye(m.n)) for m in models)
+    K = block_diag(one.matrix, other.matrix)
     return Transmission(K, **_joined(one, other, ("offset", "Iam", "Fvm", "Fcm")))
 
 

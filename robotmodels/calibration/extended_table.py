@@ -86,6 +86,11 @@ class ExtendedTable(Frozen):
         size = float(np.abs(lengths).sum())
         return size if size > _LEAST_SIZE else 1.0
 
+    @property
+    def expected_error(self) -> float:
+        """Expected error of a length, m: 1 mm from 1 m to 10 m of size, else in proportion."""
+        return 1e-3 * max(min(self.size, 1.0), 0.1 * self.size)
+
     def end_row(self, frame: Frame) -> int:
         """Row of a measured end; InvalidValueError for any other frame."""
         if frame not in self.frames:

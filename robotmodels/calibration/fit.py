@@ -161,9 +161,7 @@ def fit(
         if aligned is not None:
             aligned_model, nominal = aligned
             candidates = chosen_candidates(candidates.names, aligned_model, **options)
-    if prior is not None:
-        prior = sized(prior, candidates.table.size)
-    given_prior = prior
+    given_prior = prior = prior and sized(prior, candidates.table.expected_error)
     solution, identifiable, after, prior, identify = _estimated(
         candidates, measured, known, known_lengths, prior, loss, truncation, rng
     )

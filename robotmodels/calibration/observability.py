@@ -11,12 +11,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Frozen, as_exact, as_floats
+from .._arrays import Array, Frozen, as_count, as_exact, as_floats
 from .._arrays.tasks import Workers
 from ..errors import InvalidValueError, ShapeError
 from .identifiable import IdentifiableParameters
@@ -118,7 +117,7 @@ def observability(
     W = as_floats(psi, "psi")
     if W.ndim not in (2, 3) or not W.size:
         raise ShapeError(f"psi: expected shape (M, L) or (m, k, L), none of them 0, got {W.shape}.")
-    m = whole_number(len(W) if configurations is None else configurations, "configurations")
+    m = as_count(len(W) if configurations is None else configurations, "configurations")
     W = W.reshape(-1, W.shape[-1])
     if scales is not None:
         sizes = as_exact(scales, (W.shape[1],), "scales")
@@ -129,23 +128,10 @@ def observability(
     s[: len(values)] = values
     s[s <= _RANK_TOLERANCE * s[0]] = 0.0
     first, last = float(s[0]), float(s[-1])
-    regular = last > 0.0
-    return Observability(
-        o1=float(np.exp(np.log(s).mean()) / np.sqrt(m)) if regular else 0.0,
-        o2=last / first if regular else 0.0,
-        o3=last,
-        o4=last**2 / first if regular else 0.0,
-        o5=float(1.0 / (1.0 / s).sum()) if regular else 0.0,
-        singular_values=s,
-        configurations=m,
-    )
-
-
-def whole_number(value: Any, name: str) -> int:
-    """A whole number from 1."""
-    if isinstance(value, bool) or int(value) != value or value < 1:
-        raise InvalidValueError(f"{name}: expected a whole number from 1, got {value!r:.60}.")
-    return int(value)
+    if last <= 0.0:
+        return Observability(0.0, 0.0, 0.0, 0.0, 0.0, s, m)
+    o1, o5 = float(np.exp(np.log(s).mean()) / np.sqrt(m)), float(1.0 / (1.0 / s).sum())
+    return Observability(o1, last / first, last, last**2 / first, o5, s, m)
 
 
 # --- sets of candidates ---------------------------------------------------------------------------

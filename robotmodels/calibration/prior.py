@@ -16,7 +16,6 @@ from .parameters import ErrorLaw, GeometricParameters
 from .problem import Problem, problem_of
 
 _WRONG_ZEROS = 3.0  # increase of the prior's angles from which zeros of joints may be wrong
-_LENGTH = 1e-3  # prior standard deviation of lengths of robots of 1 m and more, m
 # least ratio of a kept parameter's correction to that of a regrouped one with the same effect, both
 # in prior standard deviations, for which the regrouped one is estimated too
 _SHARED = 0.1
@@ -31,9 +30,9 @@ class ParameterPrior(Rebuilt):
     ----------
     length, angle : float
         Standard deviations of constant corrections of lengths (m) and angles (rad) of the table;
-        infinite for no prior. The length is by default 1 mm, or a thousandth of a robot that is
-        smaller than 1 m. `fit` increases them where the corrections contradict them. Base and
-        tools have no prior, unless they are named.
+        infinite for no prior. The length is by default 1 mm for a robot whose lengths add up to 1 m
+        to 10 m, in proportion for smaller and larger ones. `fit` increases them where the
+        corrections contradict them. Base and tools have no prior, unless they are named.
     gain, compliance, eccentricity : float, optional
         Of gains and couplings (1, or the ratio of the units), of compliances (rad or m per N m or
         N), and of errors in sine and cosine (rad). By default such an error may move its joint as
@@ -70,16 +69,14 @@ class ParameterPrior(Rebuilt):
                 )
 
 
-def sized(prior: ParameterPrior, size: float) -> ParameterPrior:
-    """The prior with a number for lengths: a thousandth of the robot's size, at most 1 mm."""
-    if prior.length is not None:
-        return prior
-    return replace(prior, length=_LENGTH * min(1.0, size))
+def sized(prior: ParameterPrior, length: float) -> ParameterPrior:
+    """The prior with a number for lengths, by default this one."""
+    return prior if prior.length is not None else replace(prior, length=length)
 
 
 def standard_deviations(prior: ParameterPrior, problem: Problem) -> Array:
     """Prior standard deviations of the parameters, shape (P,); infinite without prior."""
-    prior, f = sized(prior, problem.parameters.table.size), problem.parameters.model.f
+    prior, f = sized(prior, problem.parameters.table.expected_error), problem.parameters.model.f
     by_law = {ErrorLaw.GAIN: prior.gain, ErrorLaw.COMPLIANCE: prior.compliance}
     sigma = np.full(problem.P, np.inf)
     for k, (e, largest) in enumerate(

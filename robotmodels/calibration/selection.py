@@ -9,7 +9,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Frozen, as_floats
+from .._arrays import Array, Frozen, as_count, as_floats
 from .._arrays.tasks import Progress, Workers
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
@@ -32,7 +32,6 @@ from .observability import (
     index_of,
     information,
     observability,
-    whole_number,
 )
 from .parameters import GeometricParameters
 from .problem import guessed_fixtures, linearised, problem_of
@@ -218,7 +217,7 @@ def select_configurations(
     check_model(model)
     kind = as_kind(kind)
     criterion = chosen(Criterion, criterion, "criterion")
-    count, starts = whole_number(count, "count"), whole_number(starts, "starts")
+    count, starts = as_count(count, "count"), as_count(starts, "starts")
     rng = np.random.default_rng(rng)
     work = Workers(progress=progress)
     if optimise and kind.is_constraint:
@@ -235,8 +234,8 @@ def select_configurations(
         return np.asarray((far > 0.0).all(axis=1))
 
     if candidates is None:
-        size = kind.postures if postures is None else whole_number(postures, "postures")
-        wanted = whole_number(drawn, "drawn")
+        size = kind.postures if postures is None else as_count(postures, "postures")
+        wanted = as_count(drawn, "drawn")
         rounds = (_drawn(parameters, kind, wanted, size, rng, frame) for _ in range(_DRAWS))
     else:
         given = _given(parameters, kind, candidates, frame)

@@ -17,7 +17,6 @@ from .measurements import Measurement
 from .prior import ParameterPrior, gaussian_prior, widened
 from .problem import Problem, guessed_fixtures, stacked
 
-_FIRST_LENGTH = 1e-3  # standard deviation of lengths before it has been estimated, m
 _SMALL = 0.05  # initial noise beside a prior, relative to the initial noise without one
 _ROUNDS = 10
 _PSEUDO_ROWS = 50.0
@@ -76,10 +75,9 @@ def by_units(problem: Problem, length: float, angle: float) -> tuple[Array, ...]
 
 
 def first_scales(problem: Problem) -> tuple[Array, ...]:
-    """Initial standard deviations: 1 mm, and 1 mm over the reach as an angle."""
-    size = problem.parameters.table.size
-    length = _FIRST_LENGTH * min(1.0, size)
-    return by_units(problem, length, length / size)
+    """Initial standard deviations: of lengths, and as much over the robot's size as an angle."""
+    table = problem.parameters.table
+    return by_units(problem, table.expected_error, table.expected_error / table.size)
 
 
 def solve(

@@ -19,6 +19,7 @@ from .solve import states_noise
 from .validation import Errors, HeldOutErrors
 
 _FORMAT = 2  # increased when the meaning or the name of an entry changes
+_TILT = 1e-3  # of gravity away from the world's -z, rad, beyond which it is named
 _COLUMNS = (
     *("names", "antecedent", "sigma"),
     *("gamma", "b", "beta", "alpha", "d", "theta", "r"),
@@ -199,7 +200,11 @@ def calibrated_urdf(robot: CalibratedRobot | CalibrationResult) -> str:
     2
     """
     robot = as_calibrated(robot)
-    notes, K = [*robot.notes], robot.model.transmission
+    notes, K, g = [*robot.notes], robot.model.transmission, robot.model.gravity
+    if np.linalg.norm(g[:2]) > _TILT * np.linalg.norm(g):
+        notes.append(
+            f"The tilt of the world is in the model's gravity, {g.round(3).tolist()} m/s^2."
+        )
     if robot.model.source is None:
         text = to_urdf(robot.model)
     else:
