@@ -166,13 +166,14 @@ def test_the_unit_of_length_does_not_change_anything():
         left = (rm.dgm(result.model, q) - T)[:, :3, 3] / size
         return result.names, contact.names, result.status, np.linalg.norm(left)
 
+    scaled, default = calibration.ParameterPrior, calibration.ParameterPrior()
     for small, large, prior in (
-        *((1.0, unit, calibration.ParameterPrior) for unit in (1e-6, 1e6)), (1e-6, 1e-3, None), (1e2, 1e5, None),
+        (1.0, 1e-6, scaled), (1.0, 1e6, scaled), (1e-6, 1e-3, default), (1e2, 1e5, default),
     ):  # fmt: skip
-        (*one, left), (*other, other_left) = (
-            fitted(size, prior(length=1e-3 * size) if prior else calibration.ParameterPrior())
-            for size in (small, large)
+        sizes = (
+            (size, prior if prior is default else prior(1e-3 * size)) for size in (small, large)
         )
+        (*one, left), (*other, other_left) = (fitted(*each) for each in sizes)
         assert len(one[0]) == 22
         assert other == one
         assert other_left == pytest.approx(left, rel=1e-9)

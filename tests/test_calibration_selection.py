@@ -106,7 +106,7 @@ def test_the_curve_gives_the_count_that_is_enough():
     k = chosen.counts.tolist().index(enough)
     assert (chosen.gains[k:] < 0.2).all()
     assert k == 0 or chosen.gains[k - 1] >= 0.2
-    assert chosen.enough_sentence(0.2).startswith(f"From {enough} configurations on")
+    assert chosen.enough_sentence(0.2).startswith(f"From {enough} on")
     assert chosen.enough(0.001) is None
     assert "not yet enough" in chosen.enough_sentence(0.001)
     with pytest.raises(InvalidValueError, match="gain"):

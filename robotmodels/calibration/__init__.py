@@ -22,7 +22,7 @@ from .combined_arms import combine_arms
 from .differential import differential_model
 from .fit import fit
 from .identifiable import IdentifiableParameters, Reason, identifiable_parameters
-from .inverse import corrected_igm
+from .inverse import JointOffsets, PoseOffsets, corrected_igm, joint_offsets, pose_offsets
 from .measurements import (
     AxisPosition,
     CameraPose,
@@ -39,7 +39,6 @@ from .measurements import (
     RelativePose,
 )
 from .observability import Observability, observability
-from .offsets import JointOffsets, PoseOffsets, joint_offsets, pose_offsets
 from .parameters import Compliance, GeometricParameters
 from .prior import ParameterPrior
 from .read import read_measurements

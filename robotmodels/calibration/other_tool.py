@@ -66,9 +66,8 @@ def other_tool_error(
     axes = length * np.concatenate([np.eye(3), -np.eye(3)])
     points = tip[:, None, :3, 3] + axes @ np.swapaxes(tip[:, :3, :3], 1, 2)
     # effects of the parameters, base and tool aside, on six tools at N postures, (6 N, 6, .)
-    psi = (psi * (parameters.rows <= parameters.model.f))[:, None] @ np.column_stack(
-        [factor, corrections]
-    )
+    effects = np.column_stack([factor, corrections])
+    psi = (psi * (parameters.rows <= parameters.model.f))[:, None] @ effects
     moved = psi[:, :, :3] - skew(points - T[:, None, :3, 3]) @ psi[:, :, 3:]
     turned = np.broadcast_to(psi[:, :, 3:], moved.shape)
     columns = np.concatenate([moved, turned], axis=2).reshape(-1, 6, moved.shape[-1])
@@ -78,24 +77,21 @@ def other_tool_error(
         fitted = np.linalg.lstsq(rigid.reshape(-1, 6), columns[:, :3].reshape(3 * len(points), -1))
         columns[:, :3] -= rigid @ fitted[0]
         columns[:, 3:] -= fitted[0][3:]
-    squares = columns**2
-    position = squares[:, :3, :-1].sum(axis=(1, 2))
-    angle = squares[:, 3:, :-1].sum(axis=(1, 2))
-    nominal = squares[:, :3, -1].sum(axis=1)
-    means = (position.mean(), position.max(), angle.mean(), nominal.mean())
-    rms, largest, turned, before = (float(np.sqrt(x)) for x in means)
-    return PredictedError(rms, largest, turned, before, float(length))
+    moved, turned = ((columns[:, k : k + 3] ** 2).sum(axis=1) for k in (0, 3))
+    at, angle = moved[:, :-1].sum(axis=1), turned[:, :-1].sum(axis=1)
+    means = at.mean(), at.max(), angle.mean(), moved[:, -1].mean()
+    rms, largest, turn, nominal = (float(np.sqrt(x)) for x in means)
+    return PredictedError(rms, largest, turn, nominal, float(length))
 
 
 def _posterior(result: Any) -> tuple[GeometricParameters, Array, Array]:
     """Unknown candidates, a factor F of their covariance F F^T, and their corrections."""
     identifiable, solution = result.identifiable, result.solution
     fit, estimated = solution.fit, solution.problem.parameters
-    known = {name for why in (Reason.KNOWN, Reason.GAUGE) for name in identifiable.of_reason(why)}
+    entries = identifiable.candidates.entries
+    known = {*identifiable.of_reason(Reason.KNOWN), *identifiable.of_reason(Reason.GAUGE)}
     known |= {
-        e.name
-        for e in identifiable.candidates.entries
-        if e.law is ErrorLaw.CONSTANT and not estimated.is_of_table(e)
+        e.name for e in entries if e.law is ErrorLaw.CONSTANT and not estimated.is_of_table(e)
     }
     parameters = identifiable.candidates.without(known - {*estimated.names})
     problem = problem_of(parameters, solution.problem.measurements)

@@ -148,11 +148,9 @@ def note_of_prior(
     """Note if the prior was widened; ``distances``: whether some are known."""
     if given is None or used is None or given is used:
         return ()
-    check = ""
-    if used.angle > _WRONG_ZEROS * given.angle:
-        check = " Check the zeros and signs of the joints."
-    if distances and (used.length or 0.0) > (given.length or 0.0):
-        check += " Check the known distances."
+    zeros, lengths = used.angle > _WRONG_ZEROS * given.angle, used.length != given.length
+    check = " Check the zeros and signs of the joints." * bool(zeros)
+    check += " Check the known distances." * bool(distances and lengths)
     changes = [
         f"of {name}s from {getattr(given, name):.2g} to {getattr(used, name):.2g} {unit}"
         for name, unit in (("length", "m"), ("angle", "rad"))

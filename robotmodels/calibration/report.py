@@ -16,7 +16,7 @@ from ..kinematics import operational_coordinates
 from ..table_text import ReportSection as Section
 from ..table_text import degrees, in_unit, millimetres, percent_text, printed_unit, table_of
 from .measurements import Measurement
-from .notes import has_prior, implausible
+from .notes import implausible
 from .problem import evaluations, linearised
 from .result import CalibrationResult
 from .solve import states_noise
@@ -98,9 +98,7 @@ def _prior_text(result: CalibrationResult) -> str:
         if np.isfinite(size) and result.parameters.is_of_table(entry):
             used.setdefault(entry.element.is_length, size / np.sqrt(prior.strength))
     texts = [f"{1e3 * used[k]:.3g} {'mm' if k else 'mrad'}" for k in (True, False) if k in used]
-    if texts:
-        return f" Prior standard deviations of the table: {', '.join(texts)}."
-    return " With a prior." if has_prior(result.solution) else " Without a prior."
+    return f" Prior standard deviations of the table: {', '.join(texts) or 'none'}."
 
 
 def _notes(result: CalibrationResult) -> Section:

@@ -158,20 +158,12 @@ class CalibratedRobot(Frozen):
         words = sorted({_LAW_WORDS.get(e.law, "Eccentricity") for e in present}, reverse=True)
         notes = [f"{what} of the joints: in joint_errors, not in model." for what in words]
         if bent:
-            places = ["tilt of the mount"] if bent[0] == 0 else []
-            links = ", ".join(table.row_name(row) for row in bent if row)
-            places += [f"bending before {links}"] if links else []
-            notes.append(
-                f"Compliance of links and mount ({' and '.join(places)}) is in calibrated_pose, "
-                "not in model."
-            )
+            places = ", ".join(table.row_name(row) if row else "the mount" for row in bent)
+            notes.append(f"Compliance before {places}: in calibrated_pose, not in model.")
         held = {*_tool_names(self.model), *(named.name for named in self.model.frames)}
         elsewhere = [table.row_name(end.row) for end in self.ends if end.frame not in held]
         if elsewhere:
-            notes.append(
-                f"The errors of {', '.join(elsewhere)} are in ends: the model has no frame that "
-                "could hold them."
-            )
+            notes.append(f"Errors of {', '.join(elsewhere)}: in ends, no frame of the model.")
         return tuple(notes)
 
     def end(self, frame: Frame = None) -> CalibratedEnd | None:

@@ -117,30 +117,18 @@ class SelectedConfigurations(Frozen):
 
     def enough_sentence(self, gain: float = 0.02) -> str:
         """The count of `enough` in a sentence."""
-        count = self.enough(gain)
-        if count is not None:
-            return (
-                f"From {count} configurations on, each further one lowers the expected error of "
-                f"the parameters by less than {100.0 * gain:g} %."
-            )
-        last = f"{100.0 * self.gains[-1]:.2g} %" if len(self.gains) else "an unknown share"
-        return (
-            f"{self.count} are not yet enough for a gain below {100.0 * gain:g} %: the last "
-            f"one still lowers the expected error by {last}."
-        )
+        count, part = self.enough(gain), f"{100.0 * gain:g} %"
+        if count is None:
+            return f"{self.count} are not yet enough for a gain below {part}."
+        return f"From {count} on, each further one lowers the expected error by less than {part}."
 
     def __str__(self) -> str:
-        size = self.groups.shape[1]
-        each = "" if size == 1 else f", {size} postures each"
-        lines = [
-            f"{self.count} chosen of {self.pool} candidates for {self.kind.word}{each}: "
-            f"{self.criterion.name} {self.observability.value(self.criterion):.4g} for "
-            f"{len(self.parameters)} parameters.",
-            f"{self.observability}.",
-            *self.left_out,
-            self.enough_sentence(),
-        ]
-        return "\n".join(lines)
+        chosen = (
+            f"{self.count} chosen of {self.pool} candidates for {self.kind.word}, "
+            f"{self.groups.shape[1]} postures each: {self.criterion.name} "
+            f"{self.observability.value(self.criterion):.4g} for {len(self.parameters)} parameters."
+        )
+        return "\n".join([chosen, f"{self.observability}.", *self.left_out, self.enough_sentence()])
 
 
 def select_configurations(
@@ -262,16 +250,12 @@ def select_configurations(
     ranked = groups_of(pool[np.sort(rng.permutation(len(pool))[:_RANKED])])
     measured = measurement_of(parameters, kind, ranked, frame=frame)
     kept = identifiable_on(parameters, [measured], known_lengths).kept
-    if not len(kept):
-        raise InvalidValueError(
-            f"kind: {kind.word} at the candidates identifies none of the {len(parameters)} "
-            "parameters."
-        )
     rows = group_rows(kept, kind, pool, sigma, frame)
-    p, least = len(kept), ceil(len(kept) / rows.shape[1])
-    if count < least:
+    least = ceil(len(kept) / rows.shape[1])
+    if not 0 < least <= count:
         raise InvalidValueError(
-            f"count: {p} parameters need at least {least} for {kind.word}, got {count}."
+            f"count: the {len(kept)} parameters that {kind.word} identifies at the candidates need "
+            f"at least {least}, got {count}."
         )
     effect = np.sqrt((rows**2).sum(axis=(0, 1)) / len(rows))
     scaled = rows / effect

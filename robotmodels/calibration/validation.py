@@ -156,30 +156,21 @@ def cross_validated(
     solution: Solution, parts: Partition, nominal: Errors, done: Callable[[], None]
 ) -> HeldOutErrors:
     """Errors of the held-out measurements of each part, by a fit of the others."""
-    found = []
-    known = solution.fixture_values
+    found, known = [], solution.fixture_values
     for split in parts.splits:
         problem = problem_of(solution.problem.parameters, split.training)
-        start = [known[fixture.name] for fixture in problem.fixtures]
-        fitted = refitted(
-            solution,
-            problem,
-            np.concatenate([solution.corrections, start]),
-            tuple(solution.scales[k] for k in split.numbers),
-            tolerance=ROUGH,
-        )
+        start = np.array([*solution.corrections, *(known[f.name] for f in problem.fixtures)])
+        scales = tuple(solution.scales[k] for k in split.numbers)
+        fitted = refitted(solution, problem, start, scales, tolerance=ROUGH)
         test = problem_of(problem.parameters, split.test)
         found.append(errors_of(test, fitted.corrections, fitted.fixture_values))
         done()
     blocks = np.concatenate([split.blocks for split in parts.splits])
-    return HeldOutErrors(
-        np.concatenate([errors.position for errors in found]),
-        np.concatenate([errors.angle for errors in found]),
-        blocks,
-        Errors(nominal.position[blocks], nominal.angle[blocks]),
-        len(parts.splits),
-        parts.description,
+    position, angle = (
+        np.concatenate([getattr(e, x) for e in found]) for x in ("position", "angle")
     )
+    before = Errors(nominal.position[blocks], nominal.angle[blocks])
+    return HeldOutErrors(position, angle, blocks, before, len(parts.splits), parts.description)
 
 
 def errors_on(solution: Solution, test: Sequence[Measurement]) -> HeldOutErrors:

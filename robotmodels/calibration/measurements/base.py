@@ -305,13 +305,15 @@ class Labelled(Measurement):
     @property
     def groups(self) -> NDArray[np.int64]:
         """Number of the label of each block."""
-        number = {label: k for k, label in enumerate(self.labels)}
-        return np.array([number[label] for label in self.label], dtype=np.int64)
+        return self._numbers(self.labels)
 
     @property
     def unknown_groups(self) -> NDArray[np.int64]:
         """Number of the label of each block among the unknown ones; -1 where it is known."""
-        number = {label: k for k, label in enumerate(self.unknown)}
+        return self._numbers(self.unknown)
+
+    def _numbers(self, labels: tuple[str, ...]) -> NDArray[np.int64]:
+        number = {label: k for k, label in enumerate(labels)}
         return np.array([number.get(label, -1) for label in self.label], dtype=np.int64)
 
     @property
@@ -406,25 +408,19 @@ def scale_is_observable(measurements: Iterable[Measurement], base_origin: Any = 
 def single_observations(measurements: Iterable[Measurement]) -> dict[str, str]:
     """Targets with no more rows than unknown coordinates of their own, and a sentence on each."""
     unknowns: dict[str, set[str]] = {}
-    rows, blocks = Counter[str](), Counter[str]()
+    rows = Counter[str]()
     for m in measurements:
-        own: dict[str, set[str]] = {}
-        for fixture in m.fixtures:
-            own.setdefault(fixture.name.rpartition(".")[0], set()).add(fixture.name)
-        for target, names in own.items():
-            label = target.removeprefix(f"{m.name}:")
-            # fixtures of kinds without labels are common to all blocks
-            count = m.label.count(label) if isinstance(m, Labelled) else m.blocks
+        for target in dict.fromkeys(f.name.rpartition(".")[0] for f in m.fixtures):
+            names = (f.name for f in m.fixtures if f.name.rpartition(".")[0] == target)
             unknowns.setdefault(target, set()).update(names)
+            # fixtures of kinds without labels are common to all blocks
+            label = target.removeprefix(f"{m.name}:")
+            count = m.label.count(label) if isinstance(m, Labelled) else m.blocks
             rows[target] += count * len(m.axes)
-            blocks[target] += count
-    found = {}
-    for target, names in unknowns.items():
-        if rows[target] <= len(names):
-            times = "once" if blocks[target] == 1 else f"{blocks[target]} times"
-            found[target] = (
-                f"{target} is measured {times}: {rows[target]} rows determine its {len(names)} "
-                "unknown coordinates at most, and no parameter of the robot. Measure it in more "
-                "postures, or leave it out."
-            )
-    return found
+    return {
+        target: f"{target} has {rows[target]} measured rows: they determine its {len(names)} "
+        "unknown coordinates at most, and no parameter of the robot. Measure it in more postures, "
+        "or leave it out."
+        for target, names in unknowns.items()
+        if rows[target] <= len(names)
+    }

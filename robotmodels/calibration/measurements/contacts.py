@@ -128,16 +128,11 @@ class FrameContact(Contact):
 class PlaneContact(Contact):
     """Touches of planes by the end's origin: a probe on a table, on the faces of a block.
 
-    A plane is ``normal . p = offset``. The normal of an unknown plane is estimated as the rotation
-    of the world's z about x and y, rad, with the offset, m. Sigma includes the flatness.
+    A plane is ``normal . p = offset``; the unknown normal is the world's z turned about x and y.
+    Sigma includes the flatness. The offset includes the radius of a ball that touches it.
 
-    A ball touches a plane at its radius from the centre: an unknown offset includes the
-    radius as long as the plane is touched from one side; to a known one it is added.
-
-    One inclined plane touched in many postures identifies as much as touched points do. With a
-    single plane at right angles to the axis of the first joint (a table under an upright robot)
-    that joint's offset and motions of the whole arm along the plane are not identifiable. Incline
-    it, or touch a second plane that is not parallel to it.
+    One inclined plane touched in many postures identifies as much as touched points do; of one at
+    right angles to the axis of the first joint, touch a second one that is not parallel to it.
     """
 
     q: Array = field(metadata=fields.READINGS)

@@ -47,12 +47,8 @@ from .poses import mean_poses, target_poses
 class LinkedFrames(Labelled):
     """Two ends of a tree hold the same object: ``T(q) X = T_other(q)`` with a constant X.
 
-    X, the pose of the other end in this one, is unknown and estimated, unless it is given. With
-    ``orientation=False`` they share a point only (a ball in a socket): the origin of the other
-    end is fixed in this one.
-
-    Two robots become one tree by `combine_arms`. For one robot that meets an object in several
-    postures use `FrameContact` or `PointContact`.
+    X, the pose of the other end in this one, is estimated unless it is given. With
+    ``orientation=False`` they share a point only. Two robots become one tree by `combine_arms`.
     """
 
     q: Array = field(metadata=fields.READINGS)
