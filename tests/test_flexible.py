@@ -4,6 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
+from identities.random_robots import random_pose
 from scipy.linalg import eigh, expm
 from scipy.optimize import brentq
 
@@ -22,21 +23,17 @@ def random_model(rng, n, tree=False, flex=(), drive=True):
     """A robot with every entry of its table, of revolute joints at flexible rows."""
     antecedent = [0, *(int(rng.integers(0, j + 1)) if tree else j for j in range(1, n))]
     sigma = [0 if j + 1 in flex else int(rng.integers(0, 2)) for j in range(n)]
+    sizes = np.array([[4], [4], [1], [1], [1], [4], [1]])
+    alpha, theta, d, r, beta, gamma, b = rng.uniform(-0.5, 0.5, (7, n)) * sizes
     table = DHTable(
-        antecedent=antecedent, sigma=sigma,
-        alpha=rng.uniform(-2, 2, n), d=rng.uniform(-0.5, 0.5, n),
-        theta=rng.uniform(-2, 2, n), r=rng.uniform(-0.5, 0.5, n), beta=rng.uniform(-0.3, 0.3, n),
-        gamma=rng.uniform(-2, 2, n) * tree, b=rng.uniform(-0.3, 0.3, n) * tree,
+        antecedent=antecedent, sigma=sigma, alpha=alpha, theta=theta, d=d, r=r, beta=beta,
+        gamma=gamma * tree, b=b * tree,
     )  # fmt: skip
-    A = 0.1 * rng.normal(size=(n, 3, 3))
-    S = A @ A.swapaxes(1, 2)
-    I = np.trace(S, axis1=1, axis2=2)[:, None, None] * np.eye(3) - S  # noqa: E741
-    inertia = InertialParameters.from_com(rng.uniform(0.5, 3, n), rng.uniform(-0.2, 0.2, (n, 3)), I)
+    S = (A := 0.1 * rng.normal(size=(n, 3, 3))) @ A.swapaxes(1, 2)
+    J = np.trace(S, axis1=1, axis2=2)[:, None, None] * np.eye(3) - S
+    inertia = InertialParameters.from_com(rng.uniform(0.5, 3, n), rng.uniform(-0.2, 0.2, (n, 3)), J)
     drives = DriveParameters(*rng.uniform(0.1, 1, (4, n))) if drive else DriveParameters.zeros(n)
-    base = se3.translation(*rng.uniform(-1, 1, 3))
-    base[:3, :3] = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    base[:3, 0] *= np.linalg.det(base[:3, :3])
-    tool = se3.translation(*rng.uniform(-0.3, 0.3, 3))
+    tool, base = se3.translation(*rng.uniform(-0.3, 0.3, 3)), random_pose(rng)
     return RobotModel.from_table(table, inertia, drives, base, tool, gravity=5 * rng.normal(size=3))
 
 
@@ -198,8 +195,9 @@ def test_inverse_and_direct_models_are_inverse(rng, joints):
     pairs = q.reshape(2, 2, -1), e.reshape(2, 2, -1), v[0], ev[0]
     assert flexible.idm(arm, *pairs, a[0])[0].shape == (2, 2, arm.n)
     assert flexible.ddm(arm, q[:0], e[:0], v[:0], None, q[:0])[1].shape == (0, arm.m)
-    values = arm, BEAM, BEAM.invariants, back, flexible.linearize(ONE, [0.0])
-    for value in (*values, flexible.static_deflection(ONE, [0.0]), flexible.elastica(1, 1, 1.0)):
+    values = arm, BEAM, BEAM.invariants, flexible.linearize(ONE, [0.0]), flexible.elastica(1, 1, 1)
+    still = flexible.ddm(ONE, [0.0], None, [0.0], None, [0.0])
+    for value in (*values, still, flexible.static_deflection(ONE, [0.0])):
         assert len(str(value).splitlines()) <= 6
         assert pickle.loads(pickle.dumps(value)) == value
         assert hash(pickle.loads(pickle.dumps(value))) == hash(value)
