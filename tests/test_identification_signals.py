@@ -221,7 +221,7 @@ def test_the_factor_is_that_of_all_equations():
 def test_memory_is_that_of_a_piece_whatever_the_length():
     whole = system()
     peaks = []
-    for repeats in (2, 12):
+    for repeats in (8, 24):  # the tree of merged pieces has its height
         logs = (whole.with_log(whole.log.rows(0, 40_000)) for _ in range(repeats))
         tracemalloc.start()
         reduce_equations(logs)

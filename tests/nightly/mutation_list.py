@@ -945,7 +945,7 @@ MUTATIONS = [
         "tests/test_identification_checks.py -k spikes_and_channels_that_stop_are_left_out", True),
     Mutation("logs: checks of rates", "factors are inverted",
         "def _compared(log: Log", "np.sqrt(yy / xx)", "np.sqrt(xx / yy)",
-        "tests/test_logs.py -k derivatives_by_a_factor_are_named"),
+        "tests/test_logs.py -k mistakes_are_named"),
     Mutation("logs: checks of the robot", "upper limits of positions are not looked at",
         "def _positions(log: Log", "((ends[0] < lower) | (ends[1] > upper))",
         "(ends[0] < lower)", "tests/test_logs.py -k mistakes_are_named"),
