@@ -414,7 +414,8 @@ def test_a_simulated_log_of_a_palletiser_gives_its_base_parameters_back(rng):
     noise = 0.002 * np.abs(tau).max(axis=0) * rng.normal(size=tau.shape)
     refused = [RefusedRows("run.csv", (3, 4), "not a number")]
     log = Log(0.004, q[:, robot.actuated], tau + noise, refused=refused)
-    result = rm.identification.fit(robot, log.rows(0, 3000), "wls", base=base, test=log)
+    training, rest = log.rows(0, 3000), log.rows(3000, len(log))
+    result = rm.identification.fit(robot, training, "wls", base=base, test=rest)
     errors = result.values - result.base.values(robot.tree)
     assert (np.abs(errors) < 4.5 * result.standard_errors).all()
     assert result.standard_error("MX2") < 0.02 * result.value("MX2")

@@ -56,12 +56,12 @@ def accepted_log(
 
 
 def accepted_test(
-    log: Log, test: Log, model: RobotModel, checked: bool
+    log: Log, test: Log, n: int, model: RobotModel | None, checked: bool
 ) -> tuple[Log, tuple[str, ...]]:
-    """Check and clean the test log, which must match the fitted one."""
+    """Check and clean the test log of n joints, which must match the fitted one."""
     check_is_log(test)
-    if test.n != model.n:
-        raise InvalidValueError(f"test: expected a log of {model.n} joints, got {test.n}.")
+    if test.n != n:
+        raise InvalidValueError(f"test: expected a log of {n} joints, got {test.n}.")
     if abs(test.dt - log.dt) > 1e-6 * log.dt:
         raise InvalidValueError(
             f"test: expected the sampling period of the log ({log.dt:g} s), since it is processed "

@@ -8,14 +8,22 @@ from concurrent.futures import Executor
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from .._arrays import Array
 from .._arrays.tasks import Progress
 from .._choices import chosen
 from ..drive import Drives
 from ..errors import InvalidValueError, RobotModelsWarning
 from ..estimation.columns import column_basis
+from ..estimation.covariance import (
+    CorrelatedCovariance,
+    correlated_covariance,
+    jackknife_inflation,
+)
 from ..estimation.estimate import Estimate, EstimateStatus
 from ..estimation.factor import TriangularFactors
+from ..estimation.linear import group_leverage, solved
 from ..friction import Friction
 from ..logs import Log
 from ..logs.log import check_is_log
@@ -23,16 +31,18 @@ from ..loops import LoopedParameters, LoopedRobot
 from ..minimal_parameters import BaseParameters
 from ..model import RobotModel, check_model
 from .checks import accepted_log, accepted_test
-from .equations import Equations, equations, parameters_of, reduce_equations
+from .delay import representative_part
+from .equations import Equations, equations, parameters_of, reduce_equations, segments
 from .forms import EquationForm
 from .looped import looped_equations, looped_method
 from .method_names import method_of
 from .methods.base import Method, essential
+from .methods.linear import Wls, used_weights
 from .processing import LEAST_EQUATIONS, checked_processing, processing_for
 from .result import FitDetails, IdentificationResult
-from .signals import Processing
-from .uncertainty import with_uncertainty
+from .signals import Processing, signals
 from .validation import Validation, friction_ramp, no_errors, poor_prediction, prediction_errors
+from .weak_prior import plausible_sizes, shrunk
 
 _NO_EFFECT = 1e-7  # rank tolerance: residual column norm relative to the largest
 _SPARE = 0.9
@@ -141,7 +151,7 @@ def fit(
         if checked:
             log, findings = accepted_log(log, model, "log", base.friction)
         if test is not None:
-            test, more = accepted_test(given, test, model, checked)
+            test, more = accepted_test(given, test, model.n, model, checked)
             findings = (*findings, *more)
         system, factors = _equations(base, log, form, processing, executor, progress)
     system, factors, gap, missing = _identifiable(system, factors)
@@ -275,3 +285,70 @@ def _count_notes(
             f"{len(dropped)} parameters are not essential and set to zero: {', '.join(dropped)}."
         )
     return tuple(notes)
+
+
+_SEGMENTS = 25
+_NOTED = 1.5  # least jackknife inflation factor for a note
+
+
+def with_uncertainty(
+    method: Method, system: Equations, factors: TriangularFactors, estimate: Estimate
+) -> tuple[Estimate, Array, int]:
+    """Estimate with its final covariance, standard errors for white residuals (b,), and lags.
+
+    Weighted least squares uses a weak prior on request or where the log determines little.
+    """
+    if method.covariance == "given":
+        details = estimate.details
+        return estimate, details.iid_standard_errors, details.correlation_lags
+    white = estimate.standard_errors
+    spread, ratio, inflation = _spread(method, system, factors, estimate)
+    if inflation > _NOTED:
+        note = (
+            f"Standard errors were multiplied by {inflation:.2g}: estimates from segments of the "
+            "log differ by more than stationary residuals explain. The model may be incomplete, or "
+            "the motion may excite different parameters at different times."
+        )
+        estimate = replace(estimate, notes=(*estimate.notes, note))
+    scaled = method.covariance == "scaled"
+    shrinkage = method.shrinkage if isinstance(method, Wls) else False
+    if shrinkage is None and method.essential:  # an explicit choice of parameters is kept
+        shrinkage = False
+    if shrinkage is not False:
+        part = representative_part(system.log, system.processing.motion)
+        x = signals(part, system.processing)
+        sizes = plausible_sizes(system.base, system.names, x.q, x.v, x.a, x.tau)
+        errors = np.sqrt(np.diag(spread.covariance))
+        always = bool(shrinkage) or factors.rows < LEAST_EQUATIONS * len(factors.names)
+        shrunk_estimate = shrunk(factors, estimate, errors, ratio, sizes, always)
+        if shrunk_estimate is not None:
+            estimate, scaled = shrunk_estimate, True
+    covariance = estimate.covariance * np.outer(ratio, ratio) if scaled else spread.covariance
+    return replace(estimate, covariance=covariance), white, spread.lags
+
+
+def _spread(
+    method: Method, system: Equations, factors: TriangularFactors, estimate: Estimate
+) -> tuple[CorrelatedCovariance, Array, float]:
+    """Covariance for correlated residuals, ratio of standard errors (b,), and inflation.
+
+    Covariances of other methods are for white residuals; they are scaled by the ratio of weighted
+    least squares.
+    """
+    weights = used_weights(method, factors)
+    values, inverse, rest = solved(factors, weights)
+    leverage = group_leverage(factors, weights, inverse)
+    at = estimate.values if method.covariance == "correlated" else values
+    spread = correlated_covariance(system, at, weights, inverse, leverage=leverage)
+    white = rest / (factors.rows - len(values)) * np.diag(inverse)
+    # a part of a long log is enough
+    part = representative_part(system.log, system.processing.motion)
+    part_system = system if part is system.log else system.with_log(part).cached()
+    inflation = 1.0
+    if sum(len(block) for block in part_system.blocks()) >= _SEGMENTS:
+        errors = np.sqrt(np.diag(spread.covariance))
+        parts, share = segments(part_system, _SEGMENTS), len(part) / len(system.log)
+        inflation = jackknife_inflation(parts, factors, weights, errors, share)
+    spread = replace(spread, covariance=inflation**2 * spread.covariance)
+    ratio = np.sqrt(np.diag(spread.covariance) / np.where(white > 0.0, white, 1.0))
+    return spread, ratio, inflation

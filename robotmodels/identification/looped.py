@@ -18,7 +18,7 @@ from ..errors import InvalidValueError
 from ..logs import Log
 from ..loops import ClosingStatus, LoopedParameters, LoopedRobot, base_parameters, close
 from ..minimal_parameters import BaseParameters
-from .checks import accepted_log
+from .checks import accepted_log, accepted_test
 from .equations import Equations
 from .forms import Block, FormedRows, Mask, torque_block
 from .methods.base import Method
@@ -81,11 +81,12 @@ def looped_equations(
 ) -> tuple[LoopedEquations, Log | None, tuple[str, ...]]:
     """Equations of a log of the actuated joints, the test log, and findings on both."""
     findings: tuple[str, ...] = ()
+    given = log
     if checked:
         log, findings = accepted_log(log, None, "log", joints=False)
-    if checked and test is not None:
-        test, more = accepted_log(test, None, "test", joints=False)
-        findings += tuple(f"Of the held-out log: {sentence}" for sentence in more)
+    if test is not None:
+        test, more = accepted_test(given, test, len(robot.actuated), None, checked)
+        findings += more
     if base is None:
         first = close(robot, log.q[0]) if log.n == len(robot.actuated) else None
         found = first is not None and first.status == ClosingStatus.CLOSED
@@ -96,10 +97,6 @@ def looped_equations(
         )
     log = with_all_joints(base, log)
     held_out = None if test is None else with_all_joints(base, test)
-    if held_out is not None and abs(held_out.dt - log.dt) > 1e-6 * log.dt:
-        raise InvalidValueError(
-            f"test: expected the sampling period of the log ({log.dt:g} s), got {held_out.dt:g} s."
-        )
     chosen = checked_processing(processing, log)
     if not isinstance(chosen, Processing):
         chosen = choose_processing(log, **chosen)
