@@ -21,16 +21,14 @@ class Transmission(Value):
     """Transmission between encoders (motors) and joints: ``q = K q_c + q_0``.
 
     ``q_c`` are the encoder variables, usually motor angles. Power is conserved, so torques go the
-    other way through the transpose: ``tau_c = K^T tau``. A motor whose shaft is turned by more
-    than one joint (a coupled wrist, such as motor 6 of the Staubli TX40, whose speed is that of
-    joints 5 and 6 together) has drive terms that couple those joints::
+    other way through the transpose: ``tau_c = K^T tau``. A motor whose shaft is turned by several
+    joints (motor 6 of the Staubli TX40 by joints 5 and 6) has drive terms that couple them::
 
         w = row m of K^-1 divided by its diagonal entry        (for the TX40: w_5 = w_6 = 1)
         tau_j += sum over k != j of w_j w_k (Iam a_k + Fvm v_k)  +  w_j Fcm sign(w . v)
 
     The diagonal parts (k = j) belong to ``Ia`` and ``Fv`` of `DriveParameters`, as in the
-    published TX40 identifications. Where the motors are given by the joints, ``q_motor = R q``,
-    ``K`` is the inverse of ``R``: `from_motor`.
+    published TX40 identifications. Where ``q_motor = R q`` is given: `from_motor`.
 
     Parameters
     ----------

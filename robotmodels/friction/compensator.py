@@ -17,14 +17,13 @@ from .models import JointFriction
 class GravityCompensator(JointFriction):
     """Spring or hydraulic cylinder beside revolute joints: torque as a function of their angle.
 
-    With known geometry it acts between a point of the link before the joint, at distance ``a`` from
-    the joint's axis, and a point of the link behind it, at distance ``b``, which are in line with
-    the axis and on the same side of it at ``q = phi``. Across the axis its length is
-    ``l(q) = sqrt(a^2 + b^2 - 2 a b cos(q - phi))``, and it pulls the points together with the force
-    ``Kc l + Pc``: a spring of stiffness k and free length l0 has ``Kc = k, Pc = -k l0``; a cylinder
-    with an accumulator, of force F0 at the length l1, ``Kc = k, Pc = F0 - k l1``. The joint needs
-    ``tau = (Kc l + Pc) dl/dq``. Without geometry it is a Fourier series of the angle:
-    ``tau = Gs sin(q) + Gc cos(q) + Gss sin(2 q) + Gcc cos(2 q)``.
+    With known geometry it pulls a point of the link before the joint, at distance ``a`` from the
+    axis, and a point of the link behind it, at distance ``b``, together with the force
+    ``Kc l + Pc``; both are in line with the axis, on the same side of it, at ``q = phi``, and
+    ``l(q) = sqrt(a^2 + b^2 - 2 a b cos(q - phi))``. A spring of stiffness k and free length l0 has
+    ``Kc = k, Pc = -k l0``; a cylinder with an accumulator, of force F0 at the length l1,
+    ``Kc = k, Pc = F0 - k l1``. The joint needs ``tau = (Kc l + Pc) dl/dq``. Without geometry it is
+    a Fourier series: ``tau = Gs sin(q) + Gc cos(q) + Gss sin(2 q) + Gcc cos(2 q)``.
 
     It dissipates no energy. Base parameters regroup ``Kc``, ``Gs`` and ``Gc`` into the first
     moments of a link that gravity turns in the same way.

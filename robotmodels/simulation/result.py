@@ -29,10 +29,7 @@ class SimulationStatus(Outcome):
     FINISHED = 0, "The motion was followed to its end."
     LIMIT_REACHED = 1, "A joint reached one of its limits, where the motion was to be stopped."
     NOT_CONVERGED = 2, "The allowed evaluations of the model were used up before the end."
-    STEP_TOO_SMALL = (
-        3,
-        "The steps became too small to go on: the motion grows without bound, or the torques jump.",
-    )
+    STEP_TOO_SMALL = 3, "The steps became too small: the motion has no bound, or the torques jump."
     SINGULAR = 4, "The mass matrix became singular: the accelerations are not unique."
     CHATTERING = 5, "Joints stick and slip again at the same instant without end."
 
@@ -93,11 +90,9 @@ class Simulation(Value):
         the reaction that holds it.
     sticking : ndarray of bool, shape (N, n)
         Joints that dry friction holds at rest.
-    kinetic, potential : ndarray, shape (N,)
-        Energies, J; rotors included.
-    control_work, friction_work, wrench_work : ndarray, shape (N,)
-        Work since the start, J: of the control, on friction and the drives' offsets, and of the
-        tool on the environment.
+    kinetic, potential, control_work, friction_work, wrench_work : ndarray, shape (N,)
+        Energies, J, rotors included; work since the start, J: of the control, on friction and the
+        drives' offsets, and of the tool on the environment.
     drive, events, status, evaluations, steps
         Whether drives took part; stick, slip and limits in the order of time; why it ended;
         evaluations of the model and steps of the integrator.
