@@ -43,13 +43,12 @@ def base_model(model: RobotModel, base: Base, values: ArrayLike) -> RobotModel:
     those of the robot. Its links are not physical (first moments without mass) and partly contain
     the rotors, so that single links and ``drive=False`` have no meaning.
     """
-    robot, friction = _split(model, base, values)
-    if friction is not None:
+    if base.friction is not None:
         raise InvalidValueError(
             f"base: parameters of {type(base.friction).__name__} are among them, which a model "
             "does not contain; use idm_from_base, or base parameters without friction."
         )
-    return robot
+    return _split(model, base, values)[0]
 
 
 def idm_from_base(

@@ -55,7 +55,7 @@ def with_payload(
 
     Shapes: com (3,), inertia (3, 3).
     """
-    return _with_body(model, mass, com, inertia, frame, 1.0)
+    return _with_body(model, _body(mass, com, inertia), frame, 1.0)
 
 
 def without_payload(
@@ -80,16 +80,11 @@ def without_payload(
     >>> float(loaded.inertia.mass[1]), without_payload(loaded, *payload).inertia == arm.inertia
     (2.0, True)
     """
-    return _with_body(model, mass, com, inertia, frame, -1.0)
+    return _with_body(model, _body(mass, com, inertia), frame, -1.0)
 
 
 def _with_body(
-    model: RobotModel,
-    mass: float,
-    com: ArrayLike,
-    inertia: ArrayLike | None,
-    frame: str | int | None,
-    sign: float,
+    model: RobotModel, body: InertialParameters, frame: str | int | None, sign: float
 ) -> RobotModel:
     check_model(model)
     place = model.twin.frame(frame)
@@ -100,7 +95,7 @@ def _with_body(
         )
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = place.rotation, place.position
-    row = _body(mass, com, inertia).moved(pose[None]).values[0]
+    row = body.moved(pose[None]).values[0]
     values = model.inertia.values.copy()
     old = values[place.parent - 1]
     new = old + sign * row
