@@ -195,10 +195,7 @@ def test_friction_models_beside_the_drives():
 
 
 def test_falling_arms_keep_their_energy_and_return_when_time_is_reversed():
-    for model, q, T in (
-        (double_pendulum(), [0.0, 0.3], 2.0),
-        (rm.load("panda"), np.full(7, 0.2), 0.5),
-    ):
+    for model, q, T in ((double_pendulum(), [0.0, 0.3], 2.0), (rm.load("panda"), [0.2] * 7, 0.5)):
         sim = simulate(model, q, np.zeros(model.n), t=T)
         assert sim.kinetic.max() > 1.0
         assert sim.relative_drift < 1e-9

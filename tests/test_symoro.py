@@ -268,14 +268,11 @@ def test_bad_files_say_where_and_what(read, old, new, message):
     assert str(error.value).startswith("robot.par")
 
 
-def test_symbols_keep_their_names_in_tables_and_formulas(tmp_path):
-    path = tmp_path / "elbow.par"
-    path.write_text(
-        "NL = 3\nNJ = 3\nNF = 3\nType = 0\nAnt = {0, 1, 2}\nSigma = {0, 0, 0}\nB = {0, 0, 0}\n"
-        "d = {0, L1, L1+L2}\nR = {H1, 0, 0}\ngamma = {0, 0, 0}\nAlpha = {0, Pi/2, 0}\n"
-        "Mu = {1, 1, 1}\nTheta = {t1, t2 + Pi/2, t3}\n"
-    )
-    arm = rm.read_par(path, values={"L1": 0.3, "L2": 0.2, "H1": 0.4})
+def test_symbols_keep_their_names_in_tables_and_formulas(read):
+    robot = {key: [0, 0, 0] for key in ("sigma", "gamma", "b")}
+    robot |= {"name": "elbow", "ant": [0, 1, 2], "mu": [1, 1, 1], "alpha": [0, "pi/2", 0]}
+    robot |= {"d": [0, "L1", "L1+L2"], "theta": ["t1", "t2 + pi/2", "t3"], "r": ["H1", 0, 0]}
+    arm = read(open_symoro(robot), {"L1": 0.3, "L2": 0.2, "H1": 0.4})
     assert dict(arm.table.symbols) == {("d", 2): "L1", ("d", 3): "L1+L2", ("r", 1): "H1"}
     assert "0.3 (L1)" in str(arm.table)
     assert "0.5 (L1+L2)" in str(arm.table)

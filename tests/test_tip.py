@@ -181,27 +181,6 @@ def test_side_joints_change_nothing(name):
     np.testing.assert_allclose(near, q[:3], atol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["puma560", "lab_trr"])
-def test_side_joints_stand_still_on_a_path(name):
-    rng = np.random.default_rng(8)
-    alone = rm.load(name)
-    # as many side joints as would make the Jacobian of the arm square, were they counted
-    tree, own = with_side_joints(rng, alone, max(6 - alone.n, 2))
-    still = np.setdiff1d(np.arange(tree.n), own)
-    start = rng.uniform(0.2, 0.8, tree.n)
-    q = start + np.linspace(0, 0.2, 15)[:, None]
-    T, t = rm.dgm(tree, q), np.linspace(0, 1, 15)
-    for begin in (start, None):
-        path = joint_path(tree, T, begin, t=t)
-        wanted = joint_path(alone, T, None if begin is None else begin[own], t=t)
-        np.testing.assert_allclose(path.q[:, own], wanted.q, atol=1e-6)
-        assert np.array_equal(path.status, wanted.status)
-        np.testing.assert_allclose(path.conditioning, wanted.conditioning, rtol=1e-6)
-        assert [e.kind for e in path.events] == [e.kind for e in wanted.events]
-        assert np.all(path.q[:, still] == (0.0 if begin is None else start[still]))
-        assert np.all(np.abs(path.v[:, still]) < 1e-12)
-
-
 def test_fingers_whose_limits_leave_zero_out():
     """With limits they take the nearest value inside, in every inverse model."""
     model = rm.RobotModel.from_urdf(urdf(*arm(6), *fingers(1, 1)))
