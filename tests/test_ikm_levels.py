@@ -192,7 +192,7 @@ CASES += [("regular", sizes, n) for n in (7, 9) for sizes in SEVERAL]
 )
 def test_the_largest_scale_and_the_least_motion(kind, sizes, n):
     """Lower levels leave higher ones as they are and take the largest part that is left."""
-    rng = np.random.default_rng([n, *sizes, KINDS.index(kind)])
+    rng = np.random.default_rng([*sizes, n, KINDS.index(kind)])
     parts = []
     for _ in range(9):
         J, rate, lower, upper, wish = a_case(rng, kind, sizes[0], n)

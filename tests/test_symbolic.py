@@ -204,9 +204,9 @@ def test_angles_are_exact_or_symbols(rng):
     near = explain_dgm(model)
     assert {s.name for s, _ in near.constants} == {"A1", "B2", "D2"}
     check(model, near, rng)
-    # two offsets of 3/4 pi are one of -pi/2
-    model = arm({"theta": 0.75 * np.pi}, {"theta": 0.75 * np.pi, "d": 0.4})
-    assert "3π/2" not in explain_dgm(model).text
+    # offsets of 3/4 pi and pi are one of -pi/4
+    model = arm({"theta": 0.75 * np.pi}, {"theta": np.pi, "d": 0.4})
+    assert "C12m45 = cos(θ1 + θ2 - π/4)" in explain_dgm(model).text
     check(model, explain_dgm(model), rng)
 
 

@@ -54,12 +54,12 @@ if TYPE_CHECKING:
     from .inverse.methods import *  # noqa: F403
     from .inverse.solution import *  # noqa: F403
     from .inverse.tasks import *  # noqa: F403
+    from .singular.events import SingularityKind  # noqa: F401
     from .singular.frames import *  # noqa: F403
     from .singular.nearest import *  # noqa: F403
     from .singular.rank import *  # noqa: F403
     from .singular.report import *  # noqa: F403
     from .singular.self_motion import *  # noqa: F403
-    from .singularity_kind import *  # noqa: F403
     from .statics import *  # noqa: F403
 
 _ROOMS = {
@@ -95,7 +95,7 @@ _ROOMS = {
         "singularity_flags"
     ),
     ".singular.self_motion": "SelfMotion SelfMotionKind WorkspaceSide",
-    ".singularity_kind": "SingularityKind",
+    ".singular.events": "SingularityKind",
     ".statics": "StaticStatus StaticWrench static_torque static_wrench transported_wrench",
 }
 """Imported when one of their names is first used: together they take 0.15 s."""

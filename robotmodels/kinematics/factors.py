@@ -110,24 +110,14 @@ def jacobian_factors(
     transport = np.zeros((*batch, 6, 6))
     transport[..., range(6), range(6)] = 1.0
     transport[..., :3, 3:] = -se3.skew(lever)
-    reduced = np.zeros((*batch, 6, model.n))
-    moving = set(point.path.tolist())
-    for column, row in enumerate(model.table.joint_rows):
-        if int(row) + 1 not in moving:
-            continue
-        a = poses[..., row + 1, :3, 2]
-        if model.table.sigma[row] == PRISMATIC:
-            reduced[..., :3, column] = a
-        else:
-            reduced[..., :3, column] = np.cross(a, at - poses[..., row + 1, :3, 3])
-            reduced[..., 3:, column] = a
-    reduced = np.concatenate(
-        [
-            np.einsum("...ji,...jk->...ik", axes, reduced[..., :3, :]),
-            np.einsum("...ji,...jk->...ik", axes, reduced[..., 3:, :]),
-        ],
-        axis=-2,
-    )
+    rows = model.table.joint_rows
+    links = poses[..., rows + 1, :, :]
+    a, o = links[..., :3, 2], links[..., :3, 3]
+    slides = (model.table.sigma[rows] == PRISMATIC)[:, None]
+    v, w = np.where(slides, a, np.cross(a, at[..., None, :] - o)), np.where(slides, 0.0, a)
+    columns = np.stack([v, w], axis=-2) @ axes[..., None, :, :]
+    columns = np.where(np.isin(rows + 1, point.path)[:, None, None], columns, 0.0)
+    reduced = np.ascontiguousarray(columns.reshape(*batch, model.n, 6).swapaxes(-1, -2))
     names = (model.twin.names.frames[0], *map(str, model.table.names))
     return JacobianFactors(
         rotation=rotation,

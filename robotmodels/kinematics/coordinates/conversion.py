@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import Array, as_vector
+from ..._arrays import Array, as_vector, batch_shape
 from ...errors import NotARotationError, ShapeError
 from ...se3 import ROTATION_TOLERANCE, as_pose
 from ...se3.orientation import quaternions_of, rotation_vectors_of
@@ -145,13 +145,12 @@ def continuous_coordinates(
     if near is not None:
         start = in_order(kind, as_coordinates(near, kind, "near")[..., 3:])
         try:
-            start = np.broadcast_to(start, (*others, start.shape[-1]))
+            start = np.broadcast_to(start, (*others, start.shape[-1])).reshape(-1, start.shape[-1])
         except ValueError:
             raise ShapeError(
                 f"near: expected coordinates for each sequence, shape {(*others, kind.dimension)}"
                 f" or one for all, got leading axes {start.shape[:-1]}."
             ) from None
-        start = start.reshape(-1, start.shape[-1])
     rows = int(np.prod(others))
     R = np.swapaxes(T[..., :3, :3].reshape(count, rows, 3, 3), 0, 1)
     out = np.empty((count, rows, kind.dimension - 3))
@@ -209,13 +208,7 @@ def near_coordinates(
     if near is None:
         return None
     checked = as_coordinates(near, kind, "near")
-    try:
-        np.broadcast_shapes(batch, checked.shape[:-1])
-    except ValueError:
-        raise ShapeError(
-            f"The leading (batch) axes do not broadcast against each other: poses {batch}, near "
-            f"{checked.shape}. Give each the same number of rows, or a single row."
-        ) from None
+    batch_shape((np.empty((*batch, 1)), checked), ("poses", "near"))
     return checked
 
 
@@ -232,14 +225,11 @@ def columns_of(R: Array, kind: OrientationKind) -> Array:
 def _unit(Q: Array) -> Array:
     """Quaternions of unit length; refused when they are not nearly so."""
     length = np.linalg.norm(Q, axis=-1, keepdims=True)
-    off = np.abs(length[..., 0] - 1.0)
-    if off.size and off.max() > ROTATION_TOLERANCE:
-        i = np.unravel_index(int(off.argmax()), off.shape) if off.ndim else ()
-        row = f" (row {', '.join(map(str, i))})" if i else ""
+    if (np.abs(length - 1.0) > ROTATION_TOLERANCE).any():
         raise NotARotationError(
-            f"x: the quaternion Q1 Q2 Q3 Q4 must have length 1{row}, got "
-            f"{float(length[(*i, 0)]):.9g}; at most {ROTATION_TOLERANCE:g} off is accepted and "
-            "rounded away. Divide it by its length if it is meant as a direction."
+            "x: the quaternion Q1 Q2 Q3 Q4 must have length 1, got "
+            f"{length.flat[np.abs(length - 1.0).argmax()]:.9g}; at most {ROTATION_TOLERANCE:g} off "
+            "is accepted and rounded away. Divide it by its length if it is meant as a direction."
         )
     return Q / length
 

@@ -7,6 +7,7 @@ make a factor vanish, and for the numbers, which look around one configuration.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from enum import Enum
 from itertools import combinations
 from typing import Any, NamedTuple
 
@@ -16,11 +17,28 @@ from ..._arrays import Array
 from ...geometry import PRISMATIC, REVOLUTE
 from ...model import RobotModel
 from ..poses import dgm, link_poses
-from ..singularity_kind import SingularityKind
 
 _TOLERANCE = 1e-7
 """Square roots at double zeros leave half of the digits."""
 _STRETCHED = "the arm is stretched or folded"
+
+
+class SingularityKind(Enum):
+    """Where in an arm a singular position arises.
+
+    The geometry on the zeros of the factor decides: SHOULDER where the wrist centre comes to the
+    first axis (or into the plane through it that is parallel to the second axis), or two of the
+    first three axes are aligned; ELBOW where the arm is stretched or folded (neighbouring parallel
+    axes and the wrist centre, or three parallel axes, come into one plane, or two axes in the
+    middle are aligned); WRIST where two of the last three axes are aligned or parallel. Where
+    nothing of that happens, a factor in the variables of the last three (first three) of six or
+    more joints alone is WRIST (SHOULDER), any other is OTHER.
+    """
+
+    SHOULDER = "shoulder"
+    ELBOW = "elbow"
+    WRIST = "wrist"
+    OTHER = "other"
 
 
 class _Scene(NamedTuple):

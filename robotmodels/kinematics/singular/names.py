@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._arrays import Array
-from ..singularity_kind import SingularityKind
-from .events import ArmGeometry, Event
+from .events import ArmGeometry, Event, SingularityKind
 from .search import SearchSpace, normals_of, on_set, to_set
 from .task import SingularTask, task_jacobians
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from math import pi
-from textwrap import wrap
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +17,7 @@ from ...errors import InvalidValueError
 from ...geometry import PRISMATIC
 from ...model import RobotModel
 from ...table_text import boxed
-from ..singularity_kind import SingularityKind
+from .events import SingularityKind
 from .frames import frame_words
 from .names import arm_geometry, names_at, singular_sets
 from .rank import operational_dimension
@@ -32,7 +31,6 @@ from .task import (
     singular_task,
 )
 
-_WIDTH = 100
 _ON_SET = 1e-10
 _STATIONARY = 1e-7
 _SAME = 1e-5
@@ -130,12 +128,16 @@ class NearestSingularities(Rebuilt):
         lines = [self.outcome.sentence, *counting_lines(self.mask, self.frame)]
         if not self.count:
             return "\n".join(lines)
-        kinds = [", ".join(kind.value for kind in row) for row in self.kind]
-        joints = [(f"q{j + 1}", [_short(x) for x in self.q[:, j]]) for j in range(self.q.shape[1])]
-        fixed = [("distance", [f"{d:.4g}" for d in self.distance]), ("kind", kinds)]
-        words = list(dict.fromkeys(text for row in self.words for text in row))
-        said = [part for text in words for part in wrap(text, _WIDTH, subsequent_indent="  ")]
-        return "\n".join([*lines, *_tables(fixed, joints), *said])
+        columns = [
+            ("distance", [f"{d:.4g}" for d in self.distance]),
+            ("kind", [", ".join(kind.value for kind in row) for row in self.kind]),
+        ]
+        columns += [
+            (f"q{j}", [f"{round(float(x), 5) + 0.0:.5g}" for x in column])
+            for j, column in enumerate(self.q.T, start=1)
+        ]
+        words = dict.fromkeys(text for row in self.words for text in row)
+        return "\n".join([*lines, boxed(columns), *words])
 
     def __repr__(self) -> str:
         nearest = "".join(
@@ -144,20 +146,6 @@ class NearestSingularities(Rebuilt):
             if (i := self.of(kind)) is not None
         )
         return f"<NearestSingularities {self.outcome.name}: {self.count} found{nearest}>"
-
-
-def _short(x: float) -> str:
-    return f"{round(float(x), 5) + 0.0:.5g}"
-
-
-def _tables(fixed: list[tuple[str, list[str]]], joints: list[tuple[str, list[str]]]) -> list[str]:
-    """One table, or several one below the other where the joints do not fit abreast."""
-    for count in range(max(len(joints), 1), 0, -1):
-        parts = [joints[k : k + count] for k in range(0, max(len(joints), 1), count)]
-        tables = [boxed([*fixed, *part]) for part in parts]
-        if count == 1 or max(map(len, "\n".join(tables).splitlines())) <= _WIDTH:
-            return tables
-    return []
 
 
 def nearest_singularity(

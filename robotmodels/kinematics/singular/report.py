@@ -28,7 +28,7 @@ from ..._arrays import Array, Rebuilt, as_exact, as_floats, as_number, as_vector
 from ..._outcomes import Outcome, Result
 from ...model import RobotModel
 from ...table_text import length_text
-from ..singularity_kind import SingularityKind
+from .events import SingularityKind
 from .frames import LostDirections, check_frames, frame_words, lost_in_task_axes, simplest_frame
 from .names import arm_geometry, names_at, names_near, singular_sets
 from .rank import TOLERANCE, OperationalDimension, operational_dimension, task_rank
@@ -86,14 +86,6 @@ class SingularityFlags(Result):
     mask: NDArray[np.bool_]
     frame: str
     outcomes = SingularityStatus
-
-    def __repr__(self) -> str:
-        counts = ", ".join(
-            f"{int((self.status == s).sum())} {s.name.lower().replace('_', ' ')}"
-            for s in SingularityStatus
-        )
-        what = "".join(f"; {line}" for line in counting_lines(self.mask, self.frame))
-        return f"<SingularityFlags {self.status.shape}: {counts}; dimension {self.dimension}{what}>"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
