@@ -15,7 +15,7 @@ from .._arrays import Array, Frozen, Value, as_core, as_mask, as_number, as_vect
 from ..errors import InvalidValueError
 from ..model import RobotModel, check_model
 from .ellipsoids import joint_scale
-from .jacobians import COMPONENTS, Reference, jacobian
+from .jacobians import COMPONENTS, Reference, complete_svd, jacobian
 from .lengths import length_of
 
 _ON = 1e-9
@@ -103,7 +103,7 @@ class Manipulability(Frozen, Value):
 
     def _left(self) -> tuple[Array, Array]:
         """Left singular vectors (..., m, m) and the singular values of the weighted Jacobian."""
-        return _left_vectors(self.weights[:, None] * self.jacobian)[0], self.singular_values
+        return complete_svd(self.weights[:, None] * self.jacobian)[0], self.singular_values
 
     def _component_vector(self, value: ArrayLike, name: str) -> Array:
         x = as_core(value, self.weights.shape, name)
@@ -163,14 +163,6 @@ def manipulability(
     # the size in the unit of the rows requested
     unit = np.max(np.where(rows, weights * np.repeat((own, 1.0), 3), 0.0))
     J, weights = J[..., rows, :], weights[rows]
-    _, s = _left_vectors(weights[:, None] * J)
+    s = complete_svd(weights[:, None] * J)[1]
     s = np.where(s > relative * unit * size[..., None], s, 0.0)
     return Manipulability(s, (s > 0).sum(axis=-1), J, weights)
-
-
-def _left_vectors(J: Array) -> tuple[Array, Array]:
-    """Left singular vectors (..., m, m) and m singular values of matrices (..., m, n)."""
-    m, n = J.shape[-2:]
-    padded = np.concatenate((J, np.zeros((*J.shape[:-1], max(m - n, 0)))), axis=-1)
-    U, s, _ = np.linalg.svd(padded, full_matrices=False)
-    return U, s

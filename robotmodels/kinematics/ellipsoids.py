@@ -17,7 +17,7 @@ from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel, check_model
 from .ellipsoid import Ellipsoid, EllipsoidQuantity
-from .jacobians import jacobian
+from .jacobians import complete_svd, jacobian
 from .lengths import length_of
 from .poses import dgm
 
@@ -144,13 +144,9 @@ def _principal(
     tolerance: float,
 ) -> tuple[Array, Array, NDArray[np.int64]]:
     """Axes, radii (zero below the threshold) and rank of a velocity ellipsoid."""
-    L, relative = (
-        length_of(model, frame, length),
-        as_number(tolerance, "tolerance", above=0.0, below=1.0),
-    )
+    L = length_of(model, frame, length)
+    relative = as_number(tolerance, "tolerance", above=0.0, below=1.0)
     J = jacobian(model, as_vector(q, model.n, "q"), frame) * scale
-    # at least three columns, so that there are three singular values and vectors
-    J = np.concatenate((J, np.zeros((*J.shape[:-1], max(3 - model.n, 0)))), axis=-1)
     v, w = J[..., :3, :], J[..., 3:, :] * L
     size = np.linalg.norm(J[..., :3, :], axis=(-2, -1)) + np.linalg.norm(w, axis=(-2, -1))
     threshold = (relative * size)[..., None]
@@ -160,7 +156,7 @@ def _principal(
         _, s, Vt = np.linalg.svd(hidden, full_matrices=False)
         used = np.where((s > threshold)[..., None], Vt, 0.0)
         shown = shown - (shown @ np.swapaxes(used, -1, -2)) @ used
-    U, s, _ = np.linalg.svd(shown, full_matrices=False)
+    U, s, _ = complete_svd(shown)
     radii = np.where(s > threshold, s, 0.0)
     if part is TwistPart.ANGULAR:
         radii = radii / L

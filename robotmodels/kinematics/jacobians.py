@@ -116,3 +116,10 @@ def reference_of(reference: str) -> tuple[pin.ReferenceFrame, int]:
         raise InvalidValueError(
             f"reference: expected one of {', '.join(map(repr, _REFERENCES))}, got {reference!r}."
         ) from None
+
+
+def complete_svd(J: Array) -> tuple[Array, Array, Array]:
+    """U (..., m, m), m singular values and Vt of matrices (..., m, n), zero columns added."""
+    m, n = J.shape[-2:]
+    padded = np.concatenate((J, np.zeros((*J.shape[:-1], max(m - n, 0)))), axis=-1)
+    return np.linalg.svd(padded, full_matrices=False)

@@ -18,7 +18,7 @@ from .._outcomes import Outcome, Result
 from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
 from ..se3 import as_pose
-from .jacobians import Reference, jacobian
+from .jacobians import Reference, complete_svd, jacobian
 from .lengths import length_of
 
 _EPS = float(np.finfo(np.float64).eps)
@@ -188,9 +188,7 @@ def static_wrench(
     J = rows[:, None] * jacobian(model, q, frame, reference) * joints
     required = np.broadcast_to(joints * (tau - weight), (*batch, n))
     J = np.broadcast_to(J, (*batch, 6, n))
-    # at least six columns, so that U is complete and every row has six singular values
-    padded = np.concatenate((J, np.zeros((*batch, 6, max(6 - n, 0)))), axis=-1)
-    U, s, Vt = np.linalg.svd(padded, full_matrices=False)
+    U, s, Vt = complete_svd(J)
     kept = s > threshold * s[..., :1]
     along = np.where(kept, np.einsum("...ki,...i->...k", Vt[..., :n], required), 0.0)
     inverse = np.divide(1.0, s, out=np.zeros_like(s), where=kept)

@@ -25,6 +25,7 @@ from ...geometry import PRISMATIC
 from ...model import RobotModel
 from ..jacobians import COMPONENTS, Reference, jacobian
 from ..lengths import ModelCache, characteristic_length
+from ..singular.events import random_postures
 from ..velocities import dkm_second_order
 from .bounds import JointBounds
 from .criteria import Criterion
@@ -68,7 +69,8 @@ def _scaling(
     if length is not None:
         size = as_number(length, "length", above=0.0)
     if weights is None:
-        weights = np.where(_slides(model), 1.0 / size**2, 1.0)
+        slides = model.table.sigma[model.table.joint_rows] == PRISMATIC
+        weights = np.where(slides, 1.0 / size**2, 1.0)
     weights = as_exact(weights, (model.n,), "joint_weights")
     if not (weights > 0.0).all():
         raise InvalidValueError(
@@ -88,10 +90,6 @@ def _usual_scaling(model: RobotModel, frame: str | int | None) -> Scaling:
     """That of a call without mask, weights and length."""
     key = model.twin.frame(frame).pin_id
     return _SCALINGS(model, key, lambda: _scaling(model, frame))
-
-
-def _slides(model: RobotModel) -> NDArray[np.bool_]:
-    return model.table.sigma[model.table.joint_rows] == PRISMATIC
 
 
 def check_size(rate: Array, name: str) -> None:
@@ -131,8 +129,8 @@ def solved(
     q, rate, *rest = laid
     z = rest.pop() if secondary is not None else None
     v = rest.pop() if v is not None else None
-    above = [_level(model, q, v, batch, task, "augmented") for task in _each(augmented)]
-    lower = [_level(model, q, v, batch, task, "tasks") for task in _each(tasks)]
+    above = _levels(model, q, v, batch, augmented, "augmented")
+    lower = _levels(model, q, v, batch, tasks, "tasks")
     bounds = _bounds(model, q, v, limits)
     N, n = q.shape
     drift = np.zeros((N, 6))
@@ -285,21 +283,19 @@ def secondary_motion(model: RobotModel, q: Array, secondary: Secondary) -> Array
     return as_vector(secondary, model.n, "secondary")  # type: ignore[arg-type]
 
 
-def _each(tasks: Any) -> Any:
-    """A single task is a sequence of one."""
-    return [tasks] if isinstance(tasks, Task) else tasks
-
-
-def _level(
-    model: RobotModel, q: Array, v: Array | None, batch: tuple[int, ...], task: Any, name: str
-) -> Level:
-    """Rows of a task at the configurations of a call."""
-    if not isinstance(task, Task):
-        raise InvalidValueError(
-            f"{name}: expected tasks, such as TwistTask(...) or JointTask(...), got {task!r:.80}."
-        )
-    shape = (*batch, model.n)
-    return task.level(model, q.reshape(shape), None if v is None else v.reshape(shape))
+def _levels(
+    model: RobotModel, q: Array, v: Array | None, batch: tuple[int, ...], tasks: Any, name: str
+) -> list[Level]:
+    """Rows of tasks, or of a single one, at the configurations of a call."""
+    tasks, shape = [tasks] if isinstance(tasks, Task) else tasks, (*batch, model.n)
+    for task in tasks:
+        if not isinstance(task, Task):
+            raise InvalidValueError(
+                f"{name}: expected tasks, such as TwistTask(...) or JointTask(...), got "
+                f"{task!r:.80}."
+            )
+    speeds = None if v is None else v.reshape(shape)
+    return [task.level(model, q.reshape(shape), speeds) for task in tasks]
 
 
 def _stacked(levels: Sequence[Level]) -> Level:
@@ -347,8 +343,7 @@ def _usual_rank(
 ) -> int:
     """Rank that the rows requested have at nearly all configurations."""
     scaling = _usual_scaling(model, frame)
-    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SAMPLES, model.n))
-    q *= np.where(_slides(model), characteristic_length(model, frame) / np.pi, 1.0)
+    q = random_postures(model, _SAMPLES, seed=0)
     J = jacobian(model, q, frame, reference) * (scaling.rows[:, None] * scaling.columns)
     size = np.linalg.norm(J, axis=(1, 2))
     values = np.linalg.svd(J[:, selected], compute_uv=False)

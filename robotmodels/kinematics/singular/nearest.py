@@ -235,13 +235,9 @@ def _with_crossings(
     others = _picked(others, away.min(axis=1) > 10.0 * _ASIDE)
     # points that are not exactly stationary are marked by infinity, as these are
     others = replace(others, tangential=np.full(len(others.x), np.inf))
-    both = FoundPoints(
-        *(
-            np.concatenate([getattr(found, f.name), getattr(others, f.name)])
-            for f in fields(FoundPoints)
-        )
-    )
-    return both, _distinct(space, both, limits, most)
+    both = (np.concatenate([getattr(x, f.name) for x in (found, others)]) for f in fields(found))
+    found = FoundPoints(*both)
+    return found, _distinct(space, found, limits, most)
 
 
 def _starts(
@@ -308,18 +304,13 @@ def _picked(found: FoundPoints, keep: NDArray[np.bool_]) -> FoundPoints:
 
 
 def _result(
-    space: SearchSpace,
-    home: Array,
-    found: FoundPoints | None,
-    rows: list[int],
+    space: SearchSpace, home: Array, found: FoundPoints | None, rows: list[int]
 ) -> NearestSingularities:
     """Names and statuses; what is not stationary is kept only where it stands for a kind alone."""
     task, n = space.task, len(home)
     if found is None:
-        none: Array = np.zeros((0, n))
-        empty = np.zeros(0, dtype=np.int64)
-        number = np.zeros(0)
-        found = FoundPoints(none, number, number, number, empty, none, none > 0.0)
+        none, number = np.zeros((0, n)), np.zeros(0)
+        found = FoundPoints(none, number, number, number, number.astype(int), none, none > 0.0)
     named = {}
     if rows:
         arm = arm_geometry(task)
@@ -345,10 +336,10 @@ def _result(
         outcome = SearchOutcome.ALREADY_SINGULAR if there else SearchOutcome.FOUND
     return NearestSingularities(
         home=read_only(home),
-        q=read_only((x * space.unit).reshape(len(rows), n)),
+        q=read_only(x * space.unit),
         distance=read_only(distance),
-        direction=read_only(direction.reshape(len(rows), n)),
-        escape=read_only((found.escape[rows] * space.unit).reshape(len(rows), n)),
+        direction=read_only(direction),
+        escape=read_only(found.escape[rows] * space.unit),
         slope=read_only([slope_along(space, found.x[i], found.escape[i]) for i in rows]),
         codimension=read_only(found.codimension[rows], np.int64),
         kind=tuple(tuple(dict.fromkeys(kind for kind, _ in named[i])) for i in rows),

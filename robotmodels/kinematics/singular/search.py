@@ -61,8 +61,7 @@ def nearest_points(space: SearchSpace, starts: Array) -> FoundPoints:
     tangent, held = _tangent(space, x)
     _, weakest, G = on_set(space, x)
     every, codimension = normals_of(G)
-    towards = space.start - x
-    escape = np.einsum("ari,ar->ai", every, np.einsum("ari,ai->ar", every, towards))
+    escape = _along(every, space.start - x)
     size = np.linalg.norm(escape, axis=1)
     near = size < 1e-9
     escape = np.where(near[:, None], every[:, 0], escape / np.where(near, 1.0, size)[:, None])
@@ -102,6 +101,11 @@ def normals_of(G: Array) -> tuple[Array, NDArray[np.int64]]:
     _, size, Vt = np.linalg.svd(G, full_matrices=False)
     counts = size > _WEAK * np.maximum(size[:, :1], 1e-12)
     return Vt * counts[..., None], counts.sum(axis=1)
+
+
+def _along(rows: Array, x: Array) -> Array:
+    """Parts of vectors x (N, n) in the spaces of orthonormal rows (N, r, n)."""
+    return np.einsum("ari,ar->ai", rows, np.einsum("ari,ai->ar", rows, x))
 
 
 def _step(S: Array, G: Array) -> Array:
@@ -159,7 +163,7 @@ def _tangent(space: SearchSpace, x: Array) -> tuple[Array, NDArray[np.bool_]]:
     for _ in range(x.shape[1] + 1):
         normals, _ = normals_of(np.where(held[:, None], 0.0, G))
         back = np.where(held, 0.0, space.start - x)
-        tangent = back - np.einsum("ari,ar->ai", normals, np.einsum("ari,ai->ar", normals, back))
+        tangent = back - _along(normals, back)
         leaves = ~held & ((low & (tangent < -_TIGHT)) | (high & (tangent > _TIGHT)))
         if not leaves.any():
             break
@@ -205,5 +209,4 @@ def _conditions(space: SearchSpace, x: Array, held: NDArray[np.bool_]) -> Array:
     inverse = np.where(counts, 1.0 / np.where(counts, size, 1.0), 0.0)
     to_set = np.einsum("ari,ar->ai", Vt, inverse * np.einsum("aer,ae->ar", U, S))
     back = np.where(held, 0.0, x - space.start)
-    across = np.einsum("ari,ar->ai", Vt, counts * np.einsum("ari,ai->ar", Vt, back))
-    return back - across + to_set
+    return back - _along(Vt * counts[..., None], back) + to_set
