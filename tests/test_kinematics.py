@@ -9,7 +9,11 @@ from robotmodels import kinematics as rk
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, RobotModelsError
 from robotmodels.obstacles import Sphere
 
-TASK = [rk.JointTask([0.1], [2])]
+
+def task(m):
+    return [rk.LinearTask(np.ones((1, m.n)), [0.1])]
+
+
 # function of a model, q, v and six numbers; shape of one result
 FUNCTIONS = {
     "dgm": (lambda m, q, v, x: rm.dgm(m, q), (4, 4)),
@@ -24,6 +28,18 @@ FUNCTIONS = {
     "ikm": (lambda m, q, v, x: rm.ikm(m, q, x, secondary=v).v, ("n",)),
     "error of ikm": (lambda m, q, v, x: rm.ikm(m, q, x).error, (6,)),
     "second order": (lambda m, q, v, x: rk.ikm_second_order(m, q, v, x).a, ("n",)),
+    "tasks and limits": (
+        lambda m, q, v, x: rm.ikm(m, q, x, mask="position", tasks=task(m), limits=True).v,
+        ("n",),
+    ),
+    "augmented": (
+        lambda m, q, v, x: rm.ikm(m, q, x, mask="position", augmented=task(m)).v,
+        ("n",),
+    ),
+    "second order with a task": (
+        lambda m, q, v, x: rk.ikm_second_order(m, q, v, x, mask="position", tasks=task(m)).a,
+        ("n",),
+    ),
     "coordinates": (
         lambda m, q, v, x: rm.pose_from_coordinates(
             rm.operational_coordinates(rm.dgm(m, q), "euler"), "euler"
@@ -84,29 +100,6 @@ def test_leading_axes_are_the_batch(case, model):
 def test_one_joint_and_none(case, sigma):
     rows = [{"sigma": s, "d": 0.2, "alpha": 0.3, "r": 0.1} for s in [*sigma, 2]]
     check_batches(case, rm.RobotModel.from_table(rm.DHTable.from_rows(rows)), ((), (3,)))
-
-
-def test_leading_axes_of_tasks_and_limits(rng):
-    model = rm.load("iiwa14")
-    calls = (
-        lambda q, x: rm.ikm(model, q, x, mask="position", tasks=TASK, limits=True),
-        lambda q, x: rm.ikm(model, q, x, mask="position", augmented=TASK),
-        lambda q, x: rk.ikm_second_order(model, q, 0.1 * q, x, mask="position", tasks=TASK),
-    )
-    for batch in BATCHES:
-        q, twist = rng.normal(size=(*batch, 7)), rng.normal(size=(*batch, 6))
-        for call in calls:
-            found = call(q, twist)
-            values = found.v if found.a is None else found.a
-            assert values.shape == found.v.shape == found.limited.shape == (*batch, 7)
-            for name in ("status", "rank", "damping", "scale"):
-                assert getattr(found, name).shape == batch
-            assert found.singular_values.shape[:-1] == found.task_scales.shape[:-1] == batch
-            assert all(error.shape == (*batch, 1) for error in found.task_errors)
-            for index in np.ndindex(*batch):
-                one = call(q[index], twist[index])
-                single = one.v if one.a is None else one.a
-                np.testing.assert_allclose(values[index], single, rtol=1e-11, atol=1e-11)
 
 
 def test_frames_by_name_by_number_and_the_tool(model):

@@ -38,12 +38,8 @@ class SymbolicTransform:
 class DirectModelExplanation(Explanation):
     """The symbolic direct geometric model of a robot, made by `explain_dgm`.
 
-    Printing it shows the derivation; the expressions are SymPy's.
-
     Parameters
     ----------
-    robot, frame : str
-        Names of the robot and of the frame whose pose it is.
     variables : tuple of sympy.Symbol, length n
         Joint variables in table order: ``theta_j`` if revolute, ``r_j`` if prismatic, numbered
         by frame.
@@ -62,9 +58,6 @@ class DirectModelExplanation(Explanation):
         come before it.
     constants : tuple of (sympy.Symbol, float)
         The values of lengths (metres) and angles (radians) of this robot.
-    text, latex : str
-        The derivation for people; the LaTeX has the same content, as paragraphs and amsmath
-        environments.
     """
 
     robot: str
@@ -183,7 +176,7 @@ def explain_dgm(
     base = step("Z", moves[0]) if moves[0] else None
     tool = step("E", moves[TOOL]) if moves[TOOL] else None
     notation.check_new_names()
-    steps = (*factors, *products, *(t for t in (base, tool) if t))
+    steps = [t for t in (*factors, *products, base, tool) if t]
     draft = DirectModelExplanation(
         robot=model.name,
         frame=frame_label(frame),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -102,8 +102,7 @@ class SingularityFactor:
         return f"<SingularityFactor {self.kind.value}: {self.text:.60}>"
 
 
-@dataclass(frozen=True, slots=True)
-class _Equation:
+class _Equation(NamedTuple):
     """``A cos(phi) + B sin(phi) + C = 0`` of a revolute joint, ``A r + C = 0`` of a prismatic."""
 
     joint: int

@@ -9,7 +9,6 @@ angles.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 from math import prod
 from typing import Any
 
@@ -21,20 +20,12 @@ _LONGEST_IN_TANGENTS = 400
 _PRIMES = (3, 7, 11, 19, 23, 31, 43, 47, 59, 67, 71, 79, 83, 103, 107, 127, 131, 139, 151, 163)
 
 
-@dataclass(frozen=True, slots=True)
-class Factored:
-    """``constant`` times the product of the powers."""
-
-    constant: Poly
-    factors: tuple[tuple[Poly, int], ...]
-
-
-def factored(p: Poly, chain: PolynomialChain) -> Factored:
-    """Factors of a polynomial; those without joint variables are in the constant."""
+def factored(p: Poly, chain: PolynomialChain) -> tuple[Poly, dict[Poly, int]]:
+    """Constant and powers of the factors in which a joint variable occurs."""
     ring, moving = chain.ring, chain.all_moving
     p = chain.cleaned(p)
     if not p:
-        return Factored(ring.zero, ())
+        return ring.zero, {}
     found: Counter[Poly] = Counter()
     constant, rest = _monomials(p, chain, found)
     rest = _squares(rest, chain, found)
@@ -50,7 +41,7 @@ def factored(p: Poly, chain: PolynomialChain) -> Factored:
         constant = constant * content
         # SymPy's quotients equal the same polynomial, but have other hashes
         found[ring.ring(dict(factor))] += 1
-    return Factored(constant, tuple(found.items()))
+    return constant, dict(found)
 
 
 def _monomials(p: Poly, chain: PolynomialChain, found: Counter[Poly]) -> tuple[Poly, Poly]:

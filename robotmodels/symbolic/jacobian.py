@@ -29,12 +29,8 @@ _COMPARED = 6
 class JacobianExplanation(Explanation):
     """The three matrices of the Jacobian as formulas, made by `explain_jacobian`.
 
-    Printing it shows them; the expressions are SymPy's.
-
     Parameters
     ----------
-    robot, frame : str
-        Names of the robot and of the frame whose Jacobian it is.
     projection, intermediate : str
         Names of the frames i and j, such as ``"R_3"`` and ``"R_4"``.
     rotation : sympy.ImmutableDenseMatrix, shape (3, 3)
@@ -43,10 +39,6 @@ class JacobianExplanation(Explanation):
         From the origin of R_j to that of the frame, in the axes of R_i, metres.
     reduced : sympy.ImmutableDenseMatrix, shape (6, n)
         The third matrix, rows ``[v; w]``.
-    numbers : FormulaNumbers
-        Variables, abbreviations and the constants of this robot.
-    text, latex : str
-        The formulas in plain text and in LaTeX.
     """
 
     robot: str
@@ -84,19 +76,11 @@ class JacobianExplanation(Explanation):
         transport = np.zeros((*q.shape[:-1], 6, 6))
         transport[..., range(6), range(6)] = 1.0
         transport[..., :3, 3:] = -se3.skew(self.numbers.matrix(self.lever, q)[..., 0])
-        return JacobianFactors(
-            rotation=rotation,
-            transport=transport,
-            reduced=self.numbers.matrix(self.reduced, q),
-            projection=self.projection,
-            intermediate=self.intermediate,
-        )
+        reduced = self.numbers.matrix(self.reduced, q)
+        return JacobianFactors(rotation, transport, reduced, self.projection, self.intermediate)
 
     def __repr__(self) -> str:
-        return (
-            f"<JacobianExplanation of {self.robot}: projection {self.projection}, intermediate "
-            f"frame {self.intermediate}>"
-        )
+        return f"<JacobianExplanation of {self.robot}: {self.projection}, {self.intermediate}>"
 
 
 def explain_jacobian(
@@ -285,11 +269,6 @@ def _document(e: JacobianExplanation, chain: PolynomialChain) -> Document:
     out.add(heading)
     tex = [(f"L_{left[1]}", chain.notation.tex(right)) for left, right in lever]
     out.add("\n".join(lines), aligned(tex))
-    out.add_matrix(
-        f"{name}, rows vx, vy, vz, wx, wy, wz",
-        name,
-        e.reduced,
-        ROWS,
-        [f"joint {int(row) + 1}" for row in chain.table.joint_rows],
-    )
+    columns = [f"joint {int(row) + 1}" for row in chain.table.joint_rows]
+    out.add_matrix(f"{name}, rows vx, vy, vz, wx, wy, wz", name, e.reduced, ROWS, columns)
     return out

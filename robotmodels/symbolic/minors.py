@@ -258,7 +258,5 @@ class _Reduced:
             out = ring.replaced(out, k, ring.one)
         if not out:
             return None
-        found = factored(out, self.chain)
-        if not found.constant:
-            return None
-        return tuple(q for q, _ in found.factors if self._generator(q) not in units)
+        constant, found = factored(out, self.chain)
+        return tuple(q for q in found if self._generator(q) not in units) if constant else None

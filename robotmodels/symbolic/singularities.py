@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..kinematics import SingularityKind
+from ..kinematics.lengths import ModelCache
 from ..kinematics.singular.events import ArmGeometry
 from ..model import RobotModel, check_model
 from .chain import TOOL
@@ -29,6 +29,7 @@ _MOST_TERMS = 600
 _MOST_MINORS = 40
 _LONGEST = 300
 """Minors beyond this number, and factors with more characters, are not printed."""
+_EXPLANATIONS = ModelCache()
 _ORDER = {kind: place for place, kind in enumerate(SingularityKind)}
 
 
@@ -57,7 +58,7 @@ def explain_singularities(
 
     Constants are kept as symbols while factoring. Entries below 1e-11 in random configurations
     count as zero, directions that are lost to 1e-9 as lost, and sums of constants that cancel to
-    1e-12 of their size are dropped. The last sixteen results are kept.
+    1e-12 of their size are dropped. Results are kept with the model.
 
     Examples
     --------
@@ -69,45 +70,33 @@ def explain_singularities(
     wrist | S5 | θ5 = 0 or π
     """
     check_model(model)
-    point = model.twin.frame(frame)
-    # equal models may differ in these
-    place = point.parent, point.position.tobytes(), point.rotation.tobytes()
-    key = (model.name, *place, *model.table.symbols.items())
-    return _explanation(model, key, frame, tuple(checked_names(symbols).items()))
+    model.twin.frame(frame)  # refused here, whatever is kept
+    names = checked_names(symbols)
+    key = frame, *names.items()
+    return _EXPLANATIONS(model, key, lambda: _explanation(model, frame, names))
 
 
-@lru_cache(maxsize=16, typed=True)
 def _explanation(
-    model: RobotModel,
-    _key: tuple[Any, ...],
-    frame: str | int | None,
-    symbols: tuple[tuple[str, str], ...],
+    model: RobotModel, frame: str | int | None, symbols: Mapping[str, str]
 ) -> SingularityExplanation:
-    chain = PolynomialChain(model, model.twin.frame(frame), dict(symbols))
-    empty = SingularityExplanation(
-        robot=model.name,
-        frame=frame_label(frame),
-        status=FormulaStatus.NO_JOINTS,
-        task="no rows",
-        numbers=numbers_of(chain, []),
-    )
-    if not chain.path_joints:
+    chain = PolynomialChain(model, model.twin.frame(frame), symbols)
+    numbers, none = numbers_of(chain, []), FormulaStatus.NO_JOINTS
+    draft = SingularityExplanation(model.name, frame_label(frame), none, "no rows", numbers)
+    patterns = Patterns(model, frame, chain) if chain.path_joints else None
+    task = task_of(patterns) if patterns else None
+    if not patterns or not task or not task.minors:
         chain.notation.check_new_names()
-        return _printed(empty, chain)
-    patterns = Patterns(model, frame, chain)
-    task = task_of(patterns)
-    if not task.minors:
-        chain.notation.check_new_names()
-        status, constant = FormulaStatus.NEVER_FULL_RANK, float("nan")
-        if task.too_many:
-            status = FormulaStatus.TOO_MANY_JOINTS
-        elif len(chain.path_joints) == 6:
-            constant = 0.0
-        draft = replace(empty, status=status, task=task.words, constant=constant)
+        if task:
+            status = FormulaStatus.NEVER_FULL_RANK
+            if task.too_many:
+                status = FormulaStatus.TOO_MANY_JOINTS
+            zero = len(chain.path_joints) == 6 and not task.too_many
+            constant = 0.0 if zero else float("nan")
+            draft = replace(draft, status=status, task=task.words, constant=constant)
         return _printed(draft, chain)
     arm = ArmGeometry(model, frame, chain.path_joints, task.position_only)
     products = [_product(minor, patterns, chain) for minor in task.minors]
-    return _explained(empty, task, [p for p in products if p.constant], chain, arm)
+    return _explained(draft, task, [p for p in products if p.constant], chain, arm)
 
 
 class Product(NamedTuple):
@@ -139,9 +128,9 @@ def _product(minor: Minor, patterns: Patterns, chain: PolynomialChain) -> Produc
         if D is None:
             powers[M] += 1
             continue
-        parts = factored(D, chain)
-        constant = ring.times(constant, parts.constant)
-        powers.update(dict(parts.factors))
+        part, factors = factored(D, chain)
+        constant = ring.times(constant, part)
+        powers.update(factors)
     return Product(minor, constant, dict(powers))
 
 

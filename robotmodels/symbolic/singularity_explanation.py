@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector
+from .._choices import chosen
 from ..errors import InvalidValueError
 from ..kinematics import SingularityKind
 from .explanation import Explanation, FormulaNumbers
@@ -77,14 +78,10 @@ class SingularityExplanation(Explanation):
 
     Parameters
     ----------
-    robot, frame : str
-        Names of the robot and of the frame whose motion it is.
     status : FormulaStatus
         How far the formulas go.
     task : str
         Which rows of the third matrix count, in words.
-    numbers : FormulaNumbers
-        Variables, abbreviations and the constants of this robot.
     factors : tuple of SingularityFactor
         Each once; for a matrix that is not square, those of the conditions.
     conditions : tuple of SingularityCondition
@@ -99,8 +96,6 @@ class SingularityExplanation(Explanation):
         The rows that count of the third matrix.
     rows : tuple of int
         Which those are, 0 to 5 for ``[v; w]``; empty where each minor has its own.
-    text, latex : str
-        All of it for people.
     """
 
     robot: str
@@ -147,10 +142,7 @@ class SingularityExplanation(Explanation):
 
     def factor(self, kind: SingularityKind) -> SingularityFactor:
         """The only factor of a kind; an error if there is none or several."""
-        if not isinstance(kind, SingularityKind):
-            raise InvalidValueError(
-                f"kind: expected a SingularityKind such as SingularityKind.ELBOW, got {kind!r}."
-            )
+        kind = chosen(SingularityKind, kind, "kind")
         found = [factor for factor in self.factors if factor.kind is kind]
         if len(found) == 1:
             return found[0]

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Frozen, Value, as_count, as_exact, as_vector
-from ..errors import InvalidValueError, ShapeError
+from .._arrays import Array, Frozen, Value, as_count, as_exact
+from ..errors import InvalidValueError
 from ..geometry import PRISMATIC
 from ..kinematics import SingularityKind
 from ..kinematics.inverse.tasks import joint_columns
@@ -88,33 +88,25 @@ def singularity_map(
     (('joint_3', 'joint_5'), 0.0)
     """
     check_model(model)
-    columns = _columns(model, joints)
-    q = np.zeros(model.n) if at is None else as_vector(at, model.n, "at")
-    if q.ndim != 1:
-        raise ShapeError(f"at: expected one configuration ({model.n},), got shape {q.shape}.")
+    if not isinstance(joints, (list, tuple, np.ndarray)) or len(joints) != 2:
+        raise InvalidValueError(
+            f"joints: expected two joints, columns of q or names, such as (1, 2), got {joints!r}."
+        )
+    columns = joint_columns(model, joints)
+    q = np.zeros(model.n) if at is None else as_exact(at, (model.n,), "at")
     if np.shape(samples) != (2,):
         raise InvalidValueError(
             f"samples: expected two numbers, such as (121, 121), got {samples!r}."
         )
     counts = [as_count(count, "samples", 1) for count in samples]
     limits = _limits(model, columns) if ranges is None else as_exact(ranges, (2, 2), "ranges")
-    for low, high in limits:
-        if low >= high:
-            raise InvalidValueError(
-                f"ranges: expected the lower value first, got {low:g} and {high:g}."
-            )
+    if not (limits[:, 0] < limits[:, 1]).all():
+        raise InvalidValueError(f"ranges: expected the lower value first, got {limits.tolist()}.")
     axes = [np.linspace(limits[k, 0], limits[k, 1], counts[k]) for k in range(2)]
     grid = np.tile(q, (*counts, 1))
     grid[..., columns[0]] = axes[0][:, None]
     grid[..., columns[1]] = axes[1]
     if factor is None:
-        # more joints than six never make a square matrix: no formulas are needed to know
-        count = int(np.isin(model.table.joint_rows + 1, model.twin.frame(None).path).sum())
-        if count > 6:
-            raise InvalidValueError(
-                f"{model.name}: there is no determinant ({count} joints move the tool, the matrix "
-                "is not square); pass one of explain_singularities(model).factors as factor."
-            )
         explanation = explain_singularities(model)
         values, label, unit = explanation.determinant(grid), "determinant", explanation.unit
     else:
@@ -135,14 +127,6 @@ def singularity_map(
         label=label,
         units=(own[0], own[1], unit),
     )
-
-
-def _columns(model: RobotModel, joints: Sequence[int | str]) -> list[int]:
-    if not isinstance(joints, (list, tuple, np.ndarray)) or len(joints) != 2:
-        raise InvalidValueError(
-            f"joints: expected two joints, columns of q or names, such as (1, 2), got {joints!r}."
-        )
-    return joint_columns(model, joints)
 
 
 def _limits(model: RobotModel, columns: list[int]) -> Array:
