@@ -1,10 +1,4 @@
-"""An ellipsoid of velocities or forces as data: axes, radii, and what follows from them.
-
-Examples
---------
->>> EllipsoidQuantity.FORCE.unit
-'N'
-"""
+"""An ellipsoid of velocities or forces as data: axes, radii, and what follows from them."""
 
 from __future__ import annotations
 

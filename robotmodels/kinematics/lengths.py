@@ -70,8 +70,7 @@ def _reach(model: RobotModel, frame: str | int | None) -> float:
     path = model.twin.frame(frame).path - 1
     columns = model.chain.joint[path]
     columns = columns[columns >= 0]
-    size = np.linalg.norm(model.chain.position[path], axis=1).sum()
-    size = float(size + np.linalg.norm(model.tool[:3, 3])) or 1.0
+    size = _table_size(model, path)
     kinds = _kinds(model)[columns]
     turning = kinds == REVOLUTE
     lower, upper = _finite_range(
@@ -95,8 +94,8 @@ def _kinds(model: RobotModel) -> NDArray[np.int64]:
     return model.table.sigma[model.table.joint_rows]
 
 
-def _table_size(model: RobotModel) -> float:
-    lengths = np.linalg.norm(model.chain.position, axis=1).sum()
+def _table_size(model: RobotModel, path: Any = slice(None)) -> float:
+    lengths = np.linalg.norm(model.chain.position[path], axis=1).sum()
     return float(lengths + np.linalg.norm(model.tool[:3, 3])) or 1.0
 
 

@@ -26,11 +26,6 @@ Returns
 ndarray
     Each function states its shape and unit; m is the number of coordinates.
 
-Raises
-------
-InvalidValueError, ShapeError, NotARotationError
-    As `operational_coordinates`.
-
 Examples
 --------
 >>> from robotmodels.robots import load

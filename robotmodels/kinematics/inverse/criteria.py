@@ -12,12 +12,6 @@ lower, upper : array_like, shape (n,) or (), optional
     Limits, rad or m; default the robot's. A joint with an infinite limit, or with no range, does
     not count.
 
-Raises
-------
-ShapeError, InvalidValueError
-    Arrays of the wrong shape or NaN, numbers that are not positive; what does not fit the robot is
-    refused when it is known.
-
 Examples
 --------
 >>> from robotmodels.obstacles import Sphere

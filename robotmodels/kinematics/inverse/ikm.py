@@ -78,7 +78,7 @@ def ikm(
     >>> arm = load("rx90")
     >>> found = ikm(arm, [0.1, 0.2, 1.3, 0.4, 0.5, 0.6], [0.1, 0.0, -0.2, 0.0, 0.0, 0.3])
     >>> found.reason(), bool(abs(found.error).max() < 1e-12)
-    ('The motion is met.', True)
+    ('The requested motion is achieved.', True)
     """
     check_model(model)
     q, twist = as_positions(model, q), as_vector(twist, 6, "twist")

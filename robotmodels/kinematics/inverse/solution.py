@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from ..._arrays import Array
 from ..._outcomes import Outcome, Result
 
-_SHOWN = 8
-
 
 class IKMStatus(Outcome):
     """Outcome of an inverse kinematic model for one row; fits int8.
@@ -25,13 +23,15 @@ class IKMStatus(Outcome):
         The meaning of the code.
     """
 
-    MET = 0, "The motion is met."
-    IN_PART = 1, "The motion is met in part: its weak directions are kept slow near a singularity."
-    SINGULAR = 2, "The motion has a part that cannot be produced at this singular position."
-    TOO_FEW_JOINTS = (
-        3, "The motion has a part that cannot be produced: too few degrees of freedom.",
+    MET = 0, "The requested motion is achieved."
+    IN_PART = (
+        1, "Near a singular position: the components along nearly lost directions are damped.",
     )  # fmt: skip
-    LIMITED = 4, "The motion is kept within the limits of the joints, which cannot follow it."
+    SINGULAR = 2, "Singular position: a component of the requested motion cannot be produced."
+    TOO_FEW_JOINTS = (
+        3, "Too few degrees of freedom: a component of the requested motion cannot be produced.",
+    )  # fmt: skip
+    LIMITED = 4, "Joint limits do not allow the requested motion: it is scaled down."
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -96,21 +96,4 @@ class IKMSolution(Result):
         per = "s" if self.a is None else "s^2"
         missing = [f"{hypot(*error[:3]):.4g} m/{per}"] * bool(self.mask[:3].any())
         missing += [f"{hypot(*error[3:]):.4g} rad/{per}"] * bool(self.mask[3:].any())
-        return f"{status.sentence} It misses {' and '.join(missing)}."
-
-    def __repr__(self) -> str:
-        rows = int(self.status.size)
-        values = self.v if self.a is None else self.a
-        what = "velocities" if self.a is None else "accelerations"
-        lines = [f"<IKMSolution: joint {what} for {rows} row{'s' * (rows != 1)}>"]
-        if rows > _SHOWN:
-            codes, numbers = np.unique(self.status, return_counts=True)
-            for code, number in zip(codes, numbers, strict=True):
-                lines.append(f"  {number} x {IKMStatus(code).sentence}")
-            return "\n".join(lines)
-        for i in np.ndindex(self.status.shape):
-            # no minus before a zero
-            numbers = " ".join(f"{round(float(x), 5) + 0.0:9.5f}" for x in values[i])
-            head = f"row {', '.join(map(str, i))}: " if i else ""
-            lines.append(f"  {head}[{numbers}]  {self.reason(i)}")
-        return "\n".join(lines)
+        return f"{status.sentence} The error is {' and '.join(missing)}."

@@ -18,18 +18,8 @@ mask : array_like, optional
 length : float, optional
     Metres that count as one radian; default `characteristic_length` of the frame, as in `ikm`.
 weights : array_like, shape (m,), optional
-    Positive factors that make the rows comparable; default 1.
-
-Returns
--------
-Task
-    A value for ``augmented`` or ``tasks``.
-
-Raises
-------
-ShapeError, InvalidValueError
-    Numbers of the wrong shape or not finite, a mask without a 1; what does not fit the robot is
-    refused when it is known.
+    Positive factors that make the rows comparable; default 1. What does not fit the robot is
+    refused when the robot is known.
 """
 
 from __future__ import annotations
@@ -37,6 +27,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial, wraps
+from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -269,15 +260,12 @@ def FunctionTask(
     ``gradient_rate(q, v)`` gives their time derivatives; by default differences of the gradient
     along the motion, over 1e-3 of joint travel. One function may give (N, n).
     """
-    if not callable(gradient):
-        raise InvalidValueError(
-            f"gradient: expected a function of q, got {type(gradient).__name__}; arrays are given "
-            "to LinearTask."
-        )
-    if gradient_rate is not None and not callable(gradient_rate):
-        raise InvalidValueError(
-            f"gradient_rate: expected a function of q and v, got {type(gradient_rate).__name__}."
-        )
+    for name, function in (("gradient", gradient), ("gradient_rate", gradient_rate)):
+        if not callable(function) and (function is not None or name == "gradient"):
+            raise InvalidValueError(
+                f"{name}: expected a function, got {type(function).__name__}; arrays are given to "
+                "LinearTask."
+            )
     m = np.shape(rate)[-1] if np.ndim(rate) else 0
     factors = _weights(weights, m)
 
@@ -331,7 +319,7 @@ def LinearTask(
         if n != model.n:
             raise ShapeError(f"J: expected {model.n} columns, one for each joint, got {n}.")
         try:
-            each = np.broadcast_to(J.reshape(-1, m, n), (len(q), m, n))
+            each = np.broadcast_to(J.reshape(prod(J.shape[:-2]), m, n), (len(q), m, n))
             drifts = np.broadcast_to(given.reshape(-1, m), (len(q), m))
         except ValueError:
             raise ShapeError(

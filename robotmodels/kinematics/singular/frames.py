@@ -102,7 +102,6 @@ def simplest_frame(
     links = link_poses(model, q)
     for j in model.twin.frame(task.frame).path:
         poses[int(j)] = links[int(j) - 1]
-    check_frames(task, axes, point)
     whole = task.is_whole
     if not _has_vectors(task):
         return lost_in_task_axes(task, lost)

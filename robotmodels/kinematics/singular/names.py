@@ -56,10 +56,8 @@ def singular_sets(
     n = len(q)
     start, free = q / task.joint_scale, np.full(n, np.inf)
     space = SearchSpace(task, dimension, task.joint_scale, start, -free, free)
-    perturbation = np.random.default_rng(0).normal(size=(_STARTS, n)) * np.where(
-        task.moving, _PERTURBATION, 0.0
-    )
-    x = to_set(space, start + perturbation, 25)
+    perturbation = _PERTURBATION * np.random.default_rng(0).normal(size=(_STARTS, n))
+    x = to_set(space, start + perturbation * task.moving, 25)
     away = np.linalg.norm(x - start, axis=1)
     _, weakest, G = on_set(space, x)
     keep = (weakest < _ON_SET) & (away < _AWAY)

@@ -66,22 +66,22 @@ class NearestSingularities(Rebuilt):
 
     Parameters
     ----------
-    home, q : ndarray, shapes (n,) and (S, n)
+    start, q : ndarray, shapes (n,) and (S, n)
         The given configuration, and singular ones, rad or m.
     distance : ndarray, shape (S,)
-        From ``home``, weighted: ``sqrt(sum of w (dq)^2)``, strokes in units of ``length``.
+        From ``start``, weighted: ``sqrt(sum of w (dq)^2)``, strokes in units of ``length``.
     direction : ndarray, shape (S, n)
-        ``(q - home) / distance``, rad or m per unit of distance; zero where the distance is.
+        ``(q - start) / distance``, rad or m per unit of distance; zero where the distance is.
     escape, slope : ndarray, shapes (S, n) and (S,)
         Joint direction normal to the singular set there, rad or m per unit of distance, towards
-        ``home``, and the slope of the weakest singular value along it: nearly 0 where the set is
+        ``start``, and the slope of the weakest singular value along it: nearly 0 where the set is
         touched twice, or where two sets cross.
     codimension : ndarray of int, shape (S,)
         Number of conditions on the joints that the set makes there: 1 is a surface.
     kind, words : tuples, one for each row, of tuples of SingularityKind and of str
         Names and sentences.
     residual, stationarity : ndarray, shape (S,)
-        Weakest singular value over the largest, and the part of the difference to ``home`` that
+        Weakest singular value over the largest, and the part of the difference to ``start`` that
         lies along the set, in units of distance (infinite where sets cross): 0 is exact.
     status : ndarray of int8, shape (S,)
         Codes of `NearestStatus`.
@@ -93,7 +93,7 @@ class NearestSingularities(Rebuilt):
         Components that count, and what the frame is called.
     """
 
-    home: Array
+    start: Array
     q: Array
     distance: Array
     direction: Array
@@ -140,12 +140,7 @@ class NearestSingularities(Rebuilt):
         return "\n".join([*lines, boxed(columns), *words])
 
     def __repr__(self) -> str:
-        nearest = "".join(
-            f"; {kind.value} at {self.distance[i]:.4g}"
-            for kind in SingularityKind
-            if (i := self.of(kind)) is not None
-        )
-        return f"<NearestSingularities {self.outcome.name}: {self.count} found{nearest}>"
+        return f"<NearestSingularities {self.outcome.name}: {self.count} found>"
 
 
 def nearest_singularity(
@@ -177,8 +172,6 @@ def nearest_singularity(
     weights : array_like, shape (n,), optional
         Of the squares of the joint differences, above 0; default 1. Strokes are in units of the
         characteristic length.
-    mask, mask_axes : array_like, shape (6,), optional; {"world", "tool"}
-        Components that count and their axes, as in `classify_singularity`.
     starts, most : int
         Number of starts, the given configuration included, and of configurations to keep.
     rng : numpy.random.Generator or int, optional
@@ -193,7 +186,7 @@ def nearest_singularity(
     """
     mask = deciding_mask(model, frame, mask)
     task = singular_task(model, frame, mask, mask_axes, length)
-    home = as_exact(q, (model.n,), "q")
+    start = as_exact(q, (model.n,), "q")
     if not isinstance(limits, (bool, np.bool_)):
         raise InvalidValueError(f"limits: expected True or False, got {limits!r}.")
     w = np.ones(model.n) if weights is None else as_exact(weights, (model.n,), "weights")
@@ -207,18 +200,18 @@ def nearest_singularity(
         task=task,
         dimension=whole.dimension,
         unit=unit,
-        start=home / unit,
+        start=start / unit,
         lower=model.lower / unit if limits else -free,
         upper=model.upper / unit if limits else free,
     )
-    first = _starts(task, home, count, bool(limits), generator_of(rng)) / unit
+    first = _starts(task, start, count, bool(limits), generator_of(rng)) / unit
     if not task.moving.any() or whole.dimension == 0:  # it never moves: nothing to lose
-        return _result(space, home, None, [])
+        return _result(space, start, None, [])
     found = _confirmed(space, nearest_points(space, first), bool(limits), most)
     rows = _distinct(space, found, bool(limits), most)
     if rows and np.linalg.norm(found.x[rows[0]] - space.start) < _ALREADY:
         found, rows = _with_crossings(space, first, found, rows, bool(limits), most)
-    return _result(space, home, found, rows)
+    return _result(space, start, found, rows)
 
 
 def _with_crossings(
@@ -241,15 +234,15 @@ def _with_crossings(
 
 
 def _starts(
-    task: SingularTask, home: Array, count: int, limits: bool, rng: np.random.Generator
+    task: SingularTask, start: Array, count: int, limits: bool, rng: np.random.Generator
 ) -> Array:
     """The given configuration, others around it, and others anywhere."""
     model, n = task.model, task.model.n
     prismatic = model.table.sigma[model.table.joint_rows] == PRISMATIC
     reach = np.where(prismatic, task.length, pi)
     far = np.where(np.arange(count) % 2, 1.0, 0.2)
-    starts = home + reach * far[:, None] * rng.uniform(-1.0, 1.0, size=(count, n))
-    starts[0] = home
+    starts = start + reach * far[:, None] * rng.uniform(-1.0, 1.0, size=(count, n))
+    starts[0] = start
     if limits:
         starts = np.clip(starts, model.lower, model.upper)
     return starts
@@ -304,10 +297,10 @@ def _picked(found: FoundPoints, keep: NDArray[np.bool_]) -> FoundPoints:
 
 
 def _result(
-    space: SearchSpace, home: Array, found: FoundPoints | None, rows: list[int]
+    space: SearchSpace, start: Array, found: FoundPoints | None, rows: list[int]
 ) -> NearestSingularities:
     """Names and statuses; what is not stationary is kept only where it stands for a kind alone."""
-    task, n = space.task, len(home)
+    task, n = space.task, len(start)
     if found is None:
         none, number = np.zeros((0, n)), np.zeros(0)
         found = FoundPoints(none, number, number, number, number.astype(int), none, none > 0.0)
@@ -335,7 +328,7 @@ def _result(
         there = distance[0] < _ALREADY
         outcome = SearchOutcome.ALREADY_SINGULAR if there else SearchOutcome.FOUND
     return NearestSingularities(
-        home=read_only(home),
+        start=read_only(start),
         q=read_only(x * space.unit),
         distance=read_only(distance),
         direction=read_only(direction),

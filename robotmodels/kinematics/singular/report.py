@@ -13,8 +13,8 @@ tolerance : float
 near : float
     Fraction below which a singular value that is not zero is called weak.
 mask : array_like, shape (6,), optional
-    Components that count. Default all; the position alone for a frame moved by at most three
-    joints whose position has as many freedoms as they are, as in `explain_singularities`.
+    Components that count. Default all; of a frame that at most three joints move the position
+    alone, where it has as many freedoms, as in `explain_singularities`.
 """
 
 from __future__ import annotations
@@ -264,15 +264,13 @@ def classify_singularity(
     task = singular_task(model, frame, mask, mask_axes, length)
     check_frames(task, axes, point)
     q = as_exact(q, (model.n,), "q")
-    tolerance, near = as_number(tolerance, "tolerance", above=0.0), as_number(near, "near", 0.0)
+    flags = singularity_flags(model, q, frame, task.length, tolerance, near, mask, mask_axes)
     whole = operational_dimension(model, frame, None, task.length, TOLERANCE, mask, mask_axes)
-    M = whole.dimension
+    M, r = whole.dimension, int(flags.rank)
     U, values, Vt = np.linalg.svd(task_jacobians(task, q))
     sigma = as_floats(values, "sigma")
     top = float(sigma.max(initial=0.0))
-    r = min(int((sigma > tolerance * top).sum()), M)
     strong = int((sigma[:M] > near * top).sum())
-    weakest = float(sigma[M - 1] / top) if M and top > 0.0 else 0.0
     zero = max(1e-9, 10.0 * float(sigma[r]) / top) if r < min(M, len(sigma)) and top else 1e-9
     missing = _missing(task, whole)
     lost, weak = (
@@ -285,24 +283,19 @@ def classify_singularity(
     sets = singular_sets(task, q, M, arm_geometry(task)) if min(r, strong) < M else ()
     named = names_at(sets, tolerance) if r < M else ()
     nearby = names_near(sets, named, tolerance, near) if strong < r else ()
-    status = SingularityStatus.REGULAR
-    if r < M:
-        status = SingularityStatus.SINGULAR
-    elif weakest < near and M:
-        status = SingularityStatus.NEAR_SINGULAR
     open_twist = None
     if opening is not None:
         open_twist = np.zeros(6)
         open_twist[task.mask] = opening / task.row_scale
     nothing = lost_in_task_axes(task, np.zeros((task.rows, 0)))
     return SingularityReport(
-        status=status,
+        status=SingularityStatus(int(flags.status)),
         q=read_only(q),
         dimension=M,
         rank=r,
         order=M - r,
         singular_values=read_only(sigma),
-        weakest=weakest,
+        weakest=float(flags.weakest),
         gap=float(task_rank(task, q, tolerance).gap),
         kinds=tuple(dict.fromkeys(kind for kind, _ in named)),
         words=tuple(text for _, text in named),
@@ -317,7 +310,7 @@ def classify_singularity(
         gained=M - r,
         mask=task.mask,
         length=task.length,
-        tolerance=tolerance,
+        tolerance=float(tolerance),
     )
 
 
