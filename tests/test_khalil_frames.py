@@ -128,33 +128,17 @@ def test_nearly_parallel_axes_never_run_away(tilt, flip, about, sigma):
 
 # --- tables that already follow the rules come back -----------------------------------------------
 
-# alpha (degrees), d, r, theta (degrees), index of a prismatic joint
-STANDARD = {
-    "rx90": ([0, 90, 0, -90, 90, -90], [0, 0, 0.45, 0, 0, 0], [0, 0, 0, 0.45, 0, 0], [0] * 6, None),
-    "puma": ([0, -90, 0, -90, 90, -90], [0, 0, 0.4318, 0.0203, 0, 0],
-             [0, 0, 0.15005, 0.4318, 0, 0], [0] * 6, None),
-    "ur5": ([0, 90, 0, 0, 90, -90], [0, 0, -0.425, -0.39225, 0, 0],
-            [0, 0, 0, 0.10915, 0.09465, 0], [0] * 6, None),
-    "scara": ([0, 0, 0, 0], [0, 0.4, 0.3, 0], [0, 0, 0, 0], [0] * 4, 3),
-    "stanford": ([0, -90, 90, 0, 90, -90], [0, 0, 0, 0.15, 0, 0], [0] * 6,
-                 [0, 0, 90, 90, 0, 0], 2),
-}  # fmt: skip
+FOLLOWING = ("rx90", "puma560", "ur5", "ur10e", "iiwa14", "panda", "irb140", "irb6640", "xarm6")
 
 
-@pytest.mark.parametrize("name", STANDARD)
-@pytest.mark.parametrize("offset", [0.0, -0.2])
-def test_tables_that_follow_the_rules_come_back(name, offset):
+@pytest.mark.parametrize("name", FOLLOWING)
+def test_tables_that_follow_the_rules_come_back(name):
     """Table -> URDF -> table: every column, with the zeros where the book has them."""
-    alpha, d, r, theta, prismatic = STANDARD[name]
-    f = len(alpha)
-    # x_j is fixed by the next axis unless that one coincides with z_j; x_1 is, by R_0 = R_1
-    fixed = [j > 0 and j + 1 < f and bool(alpha[j + 1] or d[j + 1]) for j in range(f)]
-    sigma = np.array([int(j == prismatic) for j in range(f)])
-    offsets = np.deg2rad(theta) + offset * np.array(fixed)
-    table = rm.DHTable(range(f), sigma, alpha=np.deg2rad(alpha), d=d, r=r, theta=offsets)
+    table = rm.load(name).table
+    table = table.replace(r=np.where(np.arange(table.f) == 0, 0.0, table.r))  # R_0 is R_1
     again = rm.RobotModel.from_urdf(rm.to_urdf(rm.RobotModel.from_table(table))).table
     assert again.names == table.names
-    for column in ("antecedent", "sigma", "mu", "gamma", "b", "beta"):
+    for column in ("antecedent", "sigma", "mu", "gamma", "b", "beta", "lower", "upper"):
         assert np.array_equal(getattr(again, column), getattr(table, column)), column
     for column in ("alpha", "d", "theta", "r"):
         got, wanted = getattr(again, column), getattr(table, column)

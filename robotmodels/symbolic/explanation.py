@@ -232,11 +232,9 @@ def _is_wide(cells: list[list[str]]) -> bool:
 
 def _bracketed(cells: list[list[str]]) -> list[str]:
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    middle = len(cells) - 2
-    left = "⎡" + "⎢" * middle + "⎣" if len(cells) > 1 else "["
-    right = "⎤" + "⎥" * middle + "⎦" if len(cells) > 1 else "]"
     lines = ["  ".join(f"{c:>{w}}" for c, w in zip(row, widths, strict=True)) for row in cells]
-    return [f"  {a} {line} {b}" for a, line, b in zip(left, lines, right, strict=True)]
+    ends = ["⎡⎤", *["⎢⎥"] * (len(cells) - 2), "⎣⎦"] if len(cells) > 1 else ["[]"]
+    return [f"  {left} {line} {right}" for (left, right), line in zip(ends, lines, strict=True)]
 
 
 def _components(cells: list[list[str]]) -> list[str]:

@@ -130,8 +130,8 @@ def factor_of(p: Poly, chain: PolynomialChain) -> tuple[SingularityFactor, int]:
     equation = _equation(p * sign, chain)
     if equation is None:
         return draft, sign
-    j = equation.joint
-    coefficients = tuple(formula(c, chain) for c in (equation.A, equation.B, equation.C))
+    j, *parts = equation
+    coefficients = tuple(formula(c, chain) for c in parts)
     draft = replace(
         draft,
         solved_joint=chain.joints[j],
@@ -140,7 +140,7 @@ def factor_of(p: Poly, chain: PolynomialChain) -> tuple[SingularityFactor, int]:
         prismatic=chain.is_prismatic(j),
         numbers=numbers_of(chain, [expression, *coefficients]),
     )
-    alone = not any(chain.joints_of(x) for x in (equation.A, equation.B, equation.C))
+    alone = not any(map(chain.joints_of, parts))
     here = draft.zeros(np.zeros(len(chain.variables))) if alone else None
     if here is not None and np.isnan(here).all():
         text, never = "it vanishes nowhere", True

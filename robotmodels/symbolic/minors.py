@@ -7,7 +7,6 @@ block triangular form (A. L. Dulmage and N. S. Mendelsohn, "Coverings of biparti
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 from math import comb
 from typing import Any, NamedTuple
@@ -15,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kinematics import jacobian
 from ..kinematics.factors import jacobian_factors
 from ..kinematics.singular.events import random_postures
 from ..kinematics.singular.task import position_decides
@@ -48,8 +48,7 @@ class Minor(NamedTuple):
     intermediate: int
 
 
-@dataclass(frozen=True, slots=True)
-class Task:
+class Task(NamedTuple):
     """Minors that decide about the rank of a task."""
 
     words: str
@@ -85,9 +84,7 @@ class Patterns:
         self.filled = {ij: pattern[:, places] for ij, pattern in patterns.items()}
         self._middle = (len(chain.path) / 2, (len(chain.path) + 1) / 2)
         self._order = {j: k for k, j in enumerate(frames)} | {TOOL: len(frames)}
-        q = random_postures(model, 4, seed=3)
-        at_frame = model.twin.names.tool if frame is None else frame
-        J = jacobian_factors(model, q, 0, at_frame, frame).reduced[..., places]
+        J = jacobian(model, random_postures(model, 4, seed=3), frame)[..., places]
         self.rank = int(np.linalg.matrix_rank(J, tol=1e-9).max())
         self.position_only = position_decides(model, frame)
 

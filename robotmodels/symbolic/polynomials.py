@@ -85,8 +85,7 @@ class TrigRing:
 
     def product(self, A: Rows, B: Rows) -> Rows:
         """Matrix product."""
-        columns = list(zip(*B, strict=True))
-        return [[self.dot(row, column) for column in columns] for row in A]
+        return [[self.dot(row, column) for column in zip(*B, strict=True)] for row in A]
 
     def applied(self, A: Rows, v: Sequence[Poly]) -> list[Poly]:
         """Product of a matrix and a vector."""
@@ -276,16 +275,16 @@ class PolynomialChain(Chain):
     @cached_property
     def parallel_groups(self) -> list[tuple[int, ...]]:
         """Successive revolute joints whose axes are parallel: their angles are added."""
-        sigma, groups = self.table.sigma, []
+        groups: list[tuple[int, ...]] = []
         axes = link_poses(self.model, np.zeros(self.model.n))[:, :3, 2]
         for j in sorted(self.cosine):
             before = self.parent[j]
-            while before > 0 and sigma[before - 1] in (PRISMATIC, FIXED):
+            while before > 0 and self.table.sigma[before - 1] in (PRISMATIC, FIXED):
                 before = self.parent[before]
-            sine = np.linalg.norm(np.cross(axes[before - 1], axes[j - 1])) if before > 0 else 1.0
-            group = next((g for g in groups if sine <= 1e-12 and before in g), None)
-            if group is None:
-                groups.append([j])
+            group = next((g for g in groups if before in g), None)
+            parallel = np.linalg.norm(np.cross(axes[before - 1], axes[j - 1])) <= 1e-12
+            if group is not None and parallel:
+                groups[groups.index(group)] = (*group, j)
             else:
-                group.append(j)
-        return [tuple(group) for group in groups]
+                groups.append((j,))
+        return groups

@@ -177,15 +177,12 @@ class _Factors:
             factor, _ = self.draft(p)
             if factor.never_zero:
                 return True
-            if factor.solved_joint is None:
-                continue
-            zeros = factor.zeros(np.zeros(len(self.chain.variables)))
-            values = {round(float(z) % (2 * np.pi), 6) for z in zeros if not np.isnan(z)}
-            joint = factor.joints[0]
-            alone[joint] = alone.get(joint, values) & values
-            if not alone[joint]:
-                return True
-        return False
+            if factor.solved_joint is not None:
+                zeros = factor.zeros(np.zeros(len(self.chain.variables)))
+                values = {round(float(z) % (2 * np.pi), 6) for z in zeros if not np.isnan(z)}
+                joint = factor.joints[0]
+                alone[joint] = alone.get(joint, values) & values
+        return not all(alone.values())
 
 
 def _explained(
@@ -223,6 +220,10 @@ def _explained(
     made = {p: replace(book(p), power=powers.get(p, 1)) for p in ordered}
     factors = tuple(made.values())
     chain.notation.check_new_names()
+    # a row of velocities of translation each, less the strokes
+    first = task.minors[0]
+    degree = sum(row < 3 for row in first.rows)
+    degree -= sum(chain.is_prismatic(chain.path_joints[c]) for c in first.columns)
     expressions += [f.expression for f in factors if f.expression is not None]
     draft = replace(
         draft,
@@ -230,7 +231,7 @@ def _explained(
         task=task.words,
         factors=factors,
         conditions=_conditions(sets or [], book, made),
-        unit=unit_text(_degree(task.minors[0], chain)),
+        unit=unit_text(degree),
         numbers=numbers_of(chain, expressions),
     )
     minors = [] if task.square else [_minor_text(p, book, chain) for p in products[:_MOST_MINORS]]
@@ -251,12 +252,6 @@ def _status(
     if any(factor.solved_joint is None for factor in factors):
         return FormulaStatus.NOT_SOLVED
     return FormulaStatus.FACTORED
-
-
-def _degree(minor: Minor, chain: PolynomialChain) -> int:
-    """Power of metres of a minor: a row of velocities of translation each, less the strokes."""
-    strokes = sum(chain.is_prismatic(chain.path_joints[c]) for c in minor.columns)
-    return sum(row < 3 for row in minor.rows) - strokes
 
 
 def _matrix(minor: Minor, chain: PolynomialChain) -> Any:

@@ -8,9 +8,9 @@ set. The events are those that name the factors of the formulas.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..._arrays import Array
 from .events import ArmGeometry, Event, SingularityKind
@@ -130,12 +130,7 @@ def _specialty(made: tuple[SingularSet, Array]) -> tuple[int, bool, int, float]:
 
 
 def _cause(
-    space: SearchSpace,
-    arm: ArmGeometry,
-    x: Array,
-    normals: Array,
-    holding: NDArray[np.bool_],
-    G: Array,
+    space: SearchSpace, arm: ArmGeometry, x: Array, normals: Array, holding: Any, G: Array
 ) -> SingularSet:
     """Events of the set at one of its points, and the distance of the configuration from it."""
     sigma = np.linalg.svd(task_jacobians(space.task, x * space.unit), compute_uv=False)

@@ -51,10 +51,7 @@ class SingularityStatus(Outcome):
     """Status of a configuration; fits int8. Each member has a ``sentence``."""
 
     REGULAR = 0, "Regular: no degree of freedom is lost."
-    NEAR_SINGULAR = (
-        1,
-        "Near a singular configuration: at least one degree of freedom is nearly lost.",
-    )
+    NEAR_SINGULAR = 1, "Near a singular configuration: a degree of freedom is nearly lost."
     SINGULAR = 2, "Singular: the robot has lost degrees of freedom."
 
 
