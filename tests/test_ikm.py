@@ -208,7 +208,7 @@ def test_at_a_singular_position_the_reachable_part_is_given(what, rng):
     within(ikm(model, q, found.reachable).error, np.zeros((100, 6)), 1e-11)
     assert (ikm(model, q, found.reachable).status == IKMStatus.MET).all()
     assert (np.linalg.norm(found.error, axis=1) > 1e-6).all()
-    assert "singular" in found.reason(0)
+    assert "Singular position" in found.reason(0)
 
 
 @pytest.mark.parametrize("speed", [0.01, 0.5, 3.0, 100.0])
