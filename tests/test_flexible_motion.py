@@ -155,14 +155,14 @@ def test_a_free_body_keeps_its_momenta_and_energy(stiffening):
 def test_modes_bent_beyond_the_second_order_of_stiffening_are_named():
     link = flexible.beam(1.0, (4.0, 6.0), tip=0.2, modes=2, stiffening=True, gyration=0.05)
     found = flexible.free_body(link, 0.05 * np.ones(4), [0, 0, 0, 0.1, 0.2, 0.3], 1.0)
-    assert found.status == FlexibleMotionStatus.BENT
+    assert found.status == FlexibleMotionStatus.LARGE_DEFLECTION
     arm = flexible.FlexibleRobot(PIVOT, {1: link})
     e = [[0.0] * 4, [0.3] * 4]
     status = flexible.ddm(arm, np.zeros((2, 1)), e, np.zeros((2, 1)), None, [0.0]).status
-    assert status.tolist() == [SpinStatus.STIFF, SpinStatus.BENT]
+    assert status.tolist() == [SpinStatus.STIFF, SpinStatus.LARGE_DEFLECTION]
     for law in (None, lambda t: [0.0]):
         bent = flexible.simulate(arm, [0.0], control=law, e0=0.1 * np.ones(4))
-        assert bent.status == FlexibleMotionStatus.BENT
+        assert bent.status == FlexibleMotionStatus.LARGE_DEFLECTION
 
 
 def test_an_arm_keeps_the_balance_of_energy_and_momenta():

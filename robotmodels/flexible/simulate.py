@@ -76,7 +76,7 @@ class FlexibleMotionStatus(Outcome):
     NOT_CONVERGED = 1, "The allowed evaluations of the model were used up before the end."
     DIVERGED = 2, "The motion grew without bound."
     SOFTENED = 3, SpinStatus.SOFTENED.sentence
-    BENT = 4, SpinStatus.BENT.sentence
+    LARGE_DEFLECTION = 4, SpinStatus.LARGE_DEFLECTION.sentence
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -236,8 +236,9 @@ def _followed(
             before = solver.t
             with suppress(SingularMassMatrixError):  # accelerations that are not finite
                 solver.step()
-            if spun[-1] == SpinStatus.BENT:  # the last evaluation of a step is at its end
-                status = FlexibleMotionStatus.BENT
+            # the last evaluation of a step is at its end
+            if spun[-1] == SpinStatus.LARGE_DEFLECTION:
+                status = FlexibleMotionStatus.LARGE_DEFLECTION
                 break
             if solver.t == before or (np.abs(solver.y) > largest).any():
                 status = FlexibleMotionStatus.DIVERGED
@@ -286,8 +287,8 @@ def _compiled_steps(
 
 def _ended(status: FlexibleMotionStatus, spun: Sequence[float]) -> FlexibleMotionStatus:
     """How a motion ended, given the codes of `SpinStatus` on its way."""
-    if status and SpinStatus.BENT in spun:
-        return FlexibleMotionStatus.BENT
+    if status and SpinStatus.LARGE_DEFLECTION in spun:
+        return FlexibleMotionStatus.LARGE_DEFLECTION
     softened = status != FlexibleMotionStatus.NOT_CONVERGED and SpinStatus.SOFTENED in spun
     return FlexibleMotionStatus.SOFTENED if softened else status
 
