@@ -10,6 +10,10 @@ frame : str or int, optional
     Name or number of the frame whose motion it is; default the tool.
 symbols : mapping of str to str, optional
     Other names of symbols, such as ``{"RL1": "l1", "C1": "c1"}``.
+robot, numbers : str and FormulaNumbers
+    Of explanations: the name of the robot; variables, abbreviations and constants.
+text, latex : str
+    Of explanations: the derivation for people; the LaTeX has the same content.
 """
 
 from .. import _docs

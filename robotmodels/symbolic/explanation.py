@@ -19,18 +19,7 @@ COMPONENTS = tuple(vector + axis for vector in "snaP" for axis in "xyz")
 
 
 class Explanation:
-    """Base of explanations: printing one shows the derivation; the expressions are SymPy's.
-
-    Parameters
-    ----------
-    robot, frame : str
-        Names of the robot and of the frame whose motion it is.
-    numbers : FormulaNumbers
-        Variables, abbreviations and the constants of this robot.
-    text, latex : str
-        The derivation for people; the LaTeX has the same content, as paragraphs and amsmath
-        environments.
-    """
+    """Base of explanations: printing one shows the derivation; the expressions are SymPy's."""
 
     __slots__ = ()
     text: str
