@@ -159,19 +159,8 @@ def free_of(space: JointSpace, q: Array, valid: Flags) -> Flags:
 def postures_of(arm: RobotModel, poses: Array, mask: Flags | None) -> tuple[Array, Flags, Flags]:
     """Postures q (N, S, n), valid (N, S), and poses (N,) that lack only the orientation."""
     section = arms.section_arm(arm)
-    if (
-        section is not None
-        and mask is not None
-        and not mask[3:].any()
-        and (mask[:3].all() or (section.columns[0] < 0 and _spans(section.frame, mask[:3])))
-    ):
-        positions = poses[:, :3, 3]
-        if not mask[:3].all():
-            # in a plane, the rest of the orientation is that of the plane
-            plane, origin = section.frame[:3, :2], section.frame[:3, 3]
-            inverse = np.linalg.inv(plane[mask[:3]])
-            positions = origin + (positions - origin)[:, mask[:3]] @ inverse.T @ plane.T
-        q, valid, _ = section.postures(positions)
+    if section is not None and mask is not None and (mask == arms.PLACE).all():
+        q, valid, _ = section.postures(poses[:, :3, 3])
         return section.model_postures(arm, q), valid, np.zeros(len(poses), np.bool_)
     known = known_arm(arm, mask is None)
     task = Task() if mask is None else Task(mask=tuple(mask.tolist()))
@@ -186,11 +175,6 @@ def postures_of(arm: RobotModel, poses: Array, mask: Flags | None) -> tuple[Arra
     q = np.where(solved.valid[..., None], 0.0, np.nan) * np.ones(arm.n)
     q[..., solver.chain.columns] = solved.q
     return q, solved.valid.copy(), np.zeros(len(poses), np.bool_)
-
-
-def _spans(frame: Array, mask: Flags) -> bool:
-    """Whether two components of a position determine a point of the plane of a frame."""
-    return mask.sum() == 2 and abs(float(np.linalg.det(frame[:3, :2][mask]))) > 1e-9
 
 
 def orientations(arm: RobotModel, mask: Flags | None = None) -> Array:

@@ -67,9 +67,9 @@ class JointSpace:
 
     def within(self, q: Array) -> tuple[Array, Flags]:
         """Configurations (..., n) turned by whole turns into the limits, and whether they fit."""
-        return (
-            self.turned(q, q)[:2] if self.limits else (q, np.asarray(np.isfinite(q).all(axis=-1)))
-        )
+        if self.limits:
+            return self.turned(q, q)[:2]
+        return q, np.asarray(np.isfinite(q).all(axis=-1))
 
     def turned(self, low: Array, high: Array) -> tuple[Array, Flags, Array]:
         """Ranges (..., n) of motions by whole turns into the limits: low ends, fits, turns."""

@@ -59,7 +59,6 @@ from .dexterity import workspace_of
 from .paths import Continuation
 from .workspace import Workspace, WorkspaceStatus, postures_in, workspace
 
-_RESOLUTION = {2: 100, 3: 20}
 _AT_A_TIME = 4096
 _LEAST = 4  # cells of a region
 _MOST_SHEETS = 64
@@ -102,10 +101,10 @@ def regions(
     joints, work = joint_space(arm, limits, free), Workers(executor, progress)
     one_of(connectivity, ("n", "t"), "connectivity")
     if over is None:
-        kind = "positions" if free is None else "free"
-        first = workspace(arm, kind, limits=limits, free=free, resolution=8)
-        resolution = _RESOLUTION[max(first.size.size, 2)]
-        w = workspace(arm, kind, limits=limits, free=free, resolution=resolution)
+        asked: Any = {"kind": "positions" if free is None else "free", "limits": limits}
+        w = workspace(arm, free=free, resolution=20, **asked)
+        if w.size.size == 2:
+            w = workspace(arm, free=free, resolution=100, **asked)
     else:
         w = workspace_of(arm, over)
         if free is not None or (w.limits and not joints.limits):

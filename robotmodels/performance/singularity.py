@@ -64,15 +64,12 @@ def sign_factors(model: RobotModel, mask: ArrayLike | str | None = None) -> Fact
         return None
     if mask is None:
         explained = explain_singularities(model)
-        if np.isfinite(explained.constant) and explained.constant != 0.0 and explained.factors:
-            kept = tuple(f for f in explained.factors if not f.never_zero)
-            return Factors(
-                model, tuple(f.text for f in kept), tuple(f.joints for f in kept), kept, rows
-            )
         if explained.constant == 0.0:
             return None
-        if np.isfinite(explained.constant) and not explained.factors:
-            return Factors(model, (), (), (), rows)
+        if np.isfinite(explained.constant):
+            kept = tuple(f for f in explained.factors if not f.never_zero)
+            names, joints = tuple(f.text for f in kept), tuple(f.joints for f in kept)
+            return Factors(model, names, joints, kept, rows)
     return determinant(model, rows)
 
 
