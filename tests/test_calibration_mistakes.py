@@ -53,70 +53,62 @@ def selected(kind, count, **options):
 
 
 @pytest.mark.parametrize(
-    ("error", "match", "call"),
+    ("match", "call"),
     [
         # measurements
-        (InvalidValueError, "q: expected finite", lambda: FrameContact(Q4 * np.nan)),
-        (ShapeError, "pose: expected a label for each of the 4", lambda: FrameContact(Q4, [0, 1])),
-        (ValueError, "has the point '2'; exp", lambda: PointContact(Q4, TWO, {2: Z[0, :3]})),
-        (InvalidValueError, "expected a mapping", lambda: PointContact(Q4, known=[0.1, 0.2, 0.3])),
-        (ValueError, r"of length 2\. Divide", lambda: PlaneContact(Q4, known={0: [0, 0, 2, 0.4]})),
-        (InvalidValueError, "axis: expected a direc", lambda: AxisPosition(Q4, 0.0, [0, 0, 0])),
-        (InvalidValueError, r"positive lengths .* offset=True", lambda: Distance(Q4, -0.1)),
-        (InvalidValueError, "not both", lambda: Distance(Q4, 0.1, Q4 + 1, pivot=[0] * 4)),
-        (ShapeError, r"T: expected shape \(4, 4, 4\)", lambda: CameraPose(Q4, STILL[:2])),
-        (NotARotationError, "T", lambda: RelativePose(Q4, Q4, 2 * STILL)),
-        (InvalidValueError, "rows: expected 6 numbers", lambda: Pose(Q4, STILL, rows=[0] * 6)),
-        (InvalidValueError, "another end than 'a'", lambda: LinkedFrames(Q4, "a", "a")),
-        (InvalidValueError, "a positive length", lambda: KnownDistance("a", "b", -1.0)),
-        (InvalidValueError, "positive definite", lambda: LaserLine(Q4, covariance=np.diag([1, 0]))),
+        ("q: expected finite", lambda: FrameContact(Q4 * np.nan)),
+        ("pose: expected a label for each of the 4", lambda: FrameContact(Q4, [0, 1])),
+        ("has the point '2'; exp", lambda: PointContact(Q4, TWO, {2: Z[0, :3]})),
+        ("expected a mapping", lambda: PointContact(Q4, known=[0.1, 0.2, 0.3])),
+        (r"of length 2\. Divide", lambda: PlaneContact(Q4, known={0: [0, 0, 2, 0.4]})),
+        ("axis: expected a direc", lambda: AxisPosition(Q4, 0.0, [0, 0, 0])),
+        (r"positive lengths .* offset=True", lambda: Distance(Q4, -0.1)),
+        ("not both", lambda: Distance(Q4, 0.1, Q4 + 1, pivot=[0] * 4)),
+        (r"T: expected shape \(4, 4, 4\)", lambda: CameraPose(Q4, STILL[:2])),
+        ("^T: ", lambda: RelativePose(Q4, Q4, 2 * STILL)),
+        ("rows: expected 6 numbers", lambda: Pose(Q4, STILL, rows=[0] * 6)),
+        ("another end than 'a'", lambda: LinkedFrames(Q4, "a", "a")),
+        ("a positive length", lambda: KnownDistance("a", "b", -1.0)),
+        ("positive definite", lambda: LaserLine(Q4, covariance=np.diag([1, 0]))),
         # fits
-        (InvalidValueError, "masses", lambda: fitted(
-            model=rm.load("stanford_arm"), compliance="joints")),
-        (InvalidValueError, "degrees", lambda: fitted(Position(np.rad2deg(Q), T[:, :3, 3]))),
-        (ShapeError, "6 joints", lambda: fitted(Position(np.zeros((4, 7)), np.zeros((4, 3))))),
-        (InvalidValueError, "expected one or more", lambda: fitted([])),
-        (InvalidValueError, "Pose, Position", lambda: fitted([T])),
-        (InvalidValueError, "held_out", lambda: fitted(held_out=1.5)),
-        (InvalidValueError, "folds", lambda: fitted(folds=1)),
-        (InvalidValueError, "ParameterPrior or None", lambda: fitted(prior="none")),
-        (InvalidValueError, "strength", lambda: fitted(
+        ("masses", lambda: fitted(model=rm.load("stanford_arm"), compliance="joints")),
+        ("degrees", lambda: fitted(Position(np.rad2deg(Q), T[:, :3, 3]))),
+        ("6 joints", lambda: fitted(Position(np.zeros((4, 7)), np.zeros((4, 3))))),
+        ("expected one or more", lambda: fitted([])),
+        ("Pose, Position", lambda: fitted([T])),
+        ("^held_out", lambda: fitted(held_out=1.5)),
+        ("^folds", lambda: fitted(folds=1)),
+        ("ParameterPrior or None", lambda: fitted(prior="none")),
+        ("^strength", lambda: fitted(
             Pose(Q4, T[:4]), parameters=["theta2"], prior=ParameterPrior(strength=None))),
-        (InvalidValueError, "theta9.*near it: theta", lambda: fitted(parameters=["theta9"])),
-        (InvalidValueError, "theta9.*near it: theta", lambda: fitted(
-            prior=ParameterPrior(named={"theta9": 1.0}))),
-        (InvalidValueError, r"contain no length.*known_lengths", lambda: fitted(PointContact(Q))),
+        ("theta9.*near it: theta", lambda: fitted(parameters=["theta9"])),
+        ("theta9.*near it: theta", lambda: fitted(prior=ParameterPrior(named={"theta9": 1.0}))),
+        (r"contain no length.*known_lengths", lambda: fitted(PointContact(Q))),
         # identifiable and chosen ones
-        (InvalidValueError, r"contain no length.*known_lengths=\('\w+',\).*d3",
-         lambda: identifiable_parameters(rm.load("kr6_r900"), "plane_contact")),
+        (r"contain no length.*known_lengths=\('\w+',\).*d3", lambda: identifiable_parameters(
+            rm.load("kr6_r900"), "plane_contact")),
         # an angle is no length, and a length of 0 shrinks to itself
-        (InvalidValueError, "contain no length",
-         lambda: identifiable_parameters(RX90, FrameContact, known_lengths=["theta2", "d5"])),
-        (InvalidValueError, "at least 5", lambda: selected("pose", 4, candidates=Q)),
-        (InvalidValueError, "expected at most 30.*got 40", lambda: selected(
-            "pose", 40, candidates=Q)),
-        (ShapeError, "candidates", lambda: selected("pose", 10, candidates=Q[:, :5])),
-        (InvalidValueError, "contain no length", lambda: selected(
-            "point_contact", 6, drawn=20, postures=2)),
-        (InvalidValueError, "do not meet", lambda: selected(
-            "point_contact", 6, candidates=Q.reshape(10, 3, 6))),
-        (InvalidValueError, "optimise", lambda: selected("point_contact", 6, optimise=True)),
-        (InvalidValueError, "at most 0", lambda: selected(
-            "pose", 6, drawn=20, obstacles=[Sphere([0, 0, 0], 5.0)])),
-        (InvalidValueError, "criterion", lambda: selected("pose", 6, criterion="O6")),
-        (InvalidValueError, "count", lambda: selected("pose", 0)),
-        (InvalidValueError, "progress", lambda: selected("pose", 6, progress="bar")),
-        (InvalidValueError, "kind: expected one of", lambda: selected(Q, 5)),
+        ("contain no length", lambda: identifiable_parameters(
+            RX90, FrameContact, known_lengths=["theta2", "d5"])),
+        ("at least 5", lambda: selected("pose", 4, candidates=Q)),
+        ("expected at most 30.*got 40", lambda: selected("pose", 40, candidates=Q)),
+        ("^candidates", lambda: selected("pose", 10, candidates=Q[:, :5])),
+        ("contain no length", lambda: selected("point_contact", 6, drawn=20, postures=2)),
+        ("do not meet", lambda: selected("point_contact", 6, candidates=Q.reshape(10, 3, 6))),
+        ("^optimise", lambda: selected("point_contact", 6, optimise=True)),
+        ("at most 0", lambda: selected("pose", 6, drawn=20, obstacles=[Sphere([0, 0, 0], 5.0)])),
+        ("^criterion", lambda: selected("pose", 6, criterion="O6")),
+        ("^count", lambda: selected("pose", 0)),
+        ("^progress", lambda: selected("pose", 6, progress="bar")),
+        ("kind: expected one of", lambda: selected(Q, 5)),
         # two robots
-        (InvalidValueError, "two different texts",
-         lambda: combine_arms(RX90, RX90, names=("a", "a"))),
-        (InvalidValueError, "its gravity",
-         lambda: combine_arms(RX90, RX90.with_gravity([0, 9.81, 0]))),
-        (NotARotationError, "base_b", lambda: combine_arms(RX90, RX90, 2 * Z)),
+        ("two different texts", lambda: combine_arms(RX90, RX90, names=("a", "a"))),
+        ("its gravity", lambda: combine_arms(RX90, RX90.with_gravity([0, 9.81, 0]))),
+        ("base_b", lambda: combine_arms(RX90, RX90, 2 * Z)),
     ],
 )  # fmt: skip
-def test_mistakes_are_named(error, match, call):
-    with pytest.raises(error, match=match):
+def test_mistakes_are_named(match, call):
+    with pytest.raises((InvalidValueError, ShapeError, NotARotationError), match=match):
         call()
 
 
