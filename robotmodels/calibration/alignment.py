@@ -111,20 +111,21 @@ def true_errors(robot: Any, real: Any, q: ArrayLike, frame: Frame = None) -> Tru
 
     ``real``: the true one; ``q (N, n)``: three or more readings that the fit did not have.
     """
-    models = [x if isinstance(x, RobotModel) else as_calibrated(x) for x in (robot, real)]
-    n = models[0].n if isinstance(models[0], RobotModel) else models[0].model.n
-    readings = np.atleast_2d(as_vector(q, n, "q")).reshape(-1, n)
-    if len(readings) < 3:
-        raise InvalidValueError(
-            f"q: expected three configurations or more to fit a base, got {len(readings)}."
+    poses = []
+    for x in (robot, real):
+        model = x if isinstance(x, RobotModel) else as_calibrated(x).model
+        readings = np.atleast_2d(as_vector(q, model.n, "q")).reshape(-1, model.n)
+        if len(readings) < 3:
+            raise InvalidValueError(
+                f"q: expected three configurations or more to fit a base, got {len(readings)}."
+            )
+        is_model = isinstance(x, RobotModel)
+        poses.append(
+            dgm(x, readings, frame)
+            if is_model
+            else calibrated_pose(as_calibrated(x), readings, frame)
         )
-    T, goal = (
-        dgm(m, readings, frame)
-        if isinstance(m, RobotModel)
-        else calibrated_pose(m, readings, frame)
-        for m in models
-    )
-    R, p, goal = T[:, :3, :3], T[:, :3, 3], goal[:, :3, 3]
+    R, p, goal = poses[0][:, :3, :3], poses[0][:, :3, 3], poses[1][:, :3, 3]
 
     def left(point: Array) -> Array:
         at = p + R @ point

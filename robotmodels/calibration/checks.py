@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from itertools import permutations
 from math import exp, log
@@ -57,25 +58,18 @@ def notes_before(problem: Problem) -> tuple[str, ...]:
     moving = {row for frame in measured_frames(measurements) for row in path(frame)}
     notes = check_readings(model, measurements, moving)
     check_units(model, measurements)
-    fixtures: dict[str, set[str]] = {}
-    shared: dict[str, None] = {}
+    owners = Counter((m.name, f.name) for m in measurements if m.views for f in m.fixtures)
     for k, m in enumerate(measurements):
-        if not m.views:
-            continue
-        if twice := _duplicates(m):
+        if m.views and (twice := _duplicates(m)):
             notes.append(
                 f"measurements[{k}] ({m.name}): {twice} of {m.blocks} rows repeat another row "
                 "exactly; they add no information, but make the standard errors too small. Leave "
                 "them out."
             )
-        names = {fixture.name for fixture in m.fixtures}
-        if names & fixtures.setdefault(m.name, set()):
-            shared[m.name] = None
-        fixtures[m.name] |= names
     notes += [
         f"More than one measurement is called {name!r}: equal labels are taken as the same point, "
         "plane or pose. Give them names of their own (name=...) if they are not."
-        for name in shared
+        for name in dict.fromkeys(name for (name, _), count in owners.items() if count > 1)
     ]
     notes += single_observations(measurements).values()
     readings = [view.q for m in measurements for view in m.views]

@@ -167,8 +167,7 @@ def _least(problem: Problem) -> tuple[Array, ...]:
 
 
 def _is_exact(problem: Problem, scales: tuple[Array, ...]) -> bool:
-    both = zip(scales, _least(problem), strict=True)
-    return any(bool((scale <= least).any()) for scale, least in both)
+    return bool((np.concatenate(scales) <= np.concatenate(_least(problem))).any())
 
 
 def _estimated_scales(
