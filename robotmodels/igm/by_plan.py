@@ -97,9 +97,9 @@ def _(solver: ByPlan, U: Array, references: Array, tolerances: Tolerances) -> Po
 
     found = solve_singular(chain, candidates, U, references, tolerances)
     lost = np.flatnonzero(~found.valid.any(axis=1))
-    if chain.k == 6 or lost.size == 0:
+    if lost.size == 0:
         return found
-    # what one equation leaves free another one determines: virtual joints find its value
+    # what one equation leaves free another one determines, or its reference has no solution
     lost = lost[is_degenerate(solver, U[lost], references[lost])]
     rest = np.ascontiguousarray(U[lost]), references[lost]
     return found.put(lost, postures(solver.family, *rest, tolerances))
