@@ -8,7 +8,7 @@ from robotmodels import se3
 from robotmodels.igm.constraints import Components
 from robotmodels.igm.kernels.elimination import eigenproblems
 from robotmodels.igm.loop import JointChain
-from robotmodels.igm.pose_search import SearchTask, pose_search, search_space
+from robotmodels.igm.pose_search import pose_search, search_space
 from robotmodels.igm.solver import Tolerances
 
 
@@ -54,7 +54,6 @@ def test_rotation_vectors_of_the_iteration_keep_their_sign_up_to_half_a_turn(rng
 
     one = JointChain(np.zeros(0, int), np.zeros(0, int), np.eye(4)[None], np.eye(4))
     space = search_space(one, np.zeros(0), np.zeros(0), False, 0, 0)
-    task = SearchTask(Components(), Tolerances(), 0, 0)
     axes = np.vstack((np.eye(3), -np.eye(3), rng.normal(size=(60, 3))))
     axes /= np.linalg.norm(axes, axis=1)[:, None]
     for axis in axes:
@@ -62,5 +61,7 @@ def test_rotation_vectors_of_the_iteration_keep_their_sign_up_to_half_a_turn(rng
             R = Rotation.from_rotvec(angle * axis).as_matrix()
             T = np.eye(4)[None]
             T[0, :3, :3] = R
-            found = pose_search(space, task, T, np.zeros((1, 0)), True).error[0, 3:]
+            found = pose_search(
+                space, Components(), (Tolerances(), 0, 0), T, np.zeros((1, 0)), True
+            ).error[0, 3:]
             np.testing.assert_allclose(found, angle * axis, rtol=0, atol=1e-14 * max(1.0, angle))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .._arrays import Array, read_only
 from .by_plan import ByPlan
-from .known import KnownArm
+from .families import KnownArm
 from .paul.layout import AT_LIMIT, GIVEN, WITHIN_LIMITS
 from .postures import Postures
 

@@ -14,12 +14,13 @@ from ..model import RobotModel
 from .arm_angle import ArmAngle, arm_angle_postures
 from .arrange import PlanRows, Rows, arranged, put, result_fields
 from .branches import branches
-from .chain import far_along_rails
+from .chain import far_along_rails, without_locked
+from .check import checked
 from .constraints import Components, constraints
-from .families import may_be_reached, may_miss_solutions
-from .known import KnownArm, known_arm, solver_for
-from .loop import JointChain
+from .families import KnownArm, known_arm, may_be_reached, may_miss_solutions, solver_for
+from .loop import JointChain, joint_chain
 from .paul.layout import GIVEN, NEEDS_CHECK, WITHIN_LIMITS
+from .pose_search import Outcome, pose_search, search_space
 from .postures import Postures, no_postures
 from .redundant import Redundant
 from .request import FARTHEST, WHOLE_POSE, Task, above_zero, locks_of, poses_of, relations_of
@@ -27,10 +28,17 @@ from .singular import complete
 from .solutions import IGMSolutions, later, of_fields
 from .solver import Solver, Tolerances, postures
 from .status import IGMStatus
-from .unreachable import diagnose
 
 NO_SOLVER = "numeric search for one posture: no family of closed forms serves this arm"
 """Method of a result where only the search serves the arm."""
+
+REASON = (4, 60)
+"""Starts and steps of the search that only looks for the reason why a pose has no solution."""
+THOROUGH = (100, 40)
+"""The same where no method proves that there is none."""
+SEED = 20
+NEAR = 1e-5
+"""Error up to which a closest posture says nothing of the reach: it is refined [m, rad]."""
 
 _FLOAT = np.dtype(np.float64)
 
@@ -298,3 +306,54 @@ def moving_joints(chain: JointChain, task: Task, U: Array, found: Postures) -> N
     null = np.where((np.arange(chain.k) >= rank[:, None])[..., None], rows, 0.0)
     moving[n, s] = np.abs(null).max(axis=1) > 1e-6
     return moving
+
+
+# --- poses without solution ---
+
+
+def diagnose(
+    model: RobotModel,
+    task: Task,
+    thorough: NDArray[np.bool_],
+    U: Array,
+    references: Array,
+    limits: bool,
+    tolerances: Tolerances,
+) -> Outcome:
+    """Status of poses without IK solution, the closest posture and its error, in columns of q.
+
+    Shapes: thorough (N,); U (N, 4, 4) in R_0, references (N, n). A search that met a pose outside
+    the limits, or without the relations or the arm angle, proves nothing: NaN, not converged.
+    """
+    chain = without_locked(joint_chain(model), task.locks)
+    columns, N = chain.columns, len(U)
+    lower, upper = model.lower[columns], model.upper[columns]
+    q, family = references.copy(), np.zeros(references.shape, np.bool_)
+    error, residual = np.empty((N, 6)), np.empty(N)
+    met, status = np.empty(N, np.bool_), np.empty(N, np.int8)
+    for rows, effort in (
+        (np.flatnonzero(~thorough), REASON), (np.flatnonzero(thorough), THOROUGH),
+    ):  # fmt: skip
+        if rows.size:
+            at = np.ix_(rows, columns)
+            space = search_space(chain, lower, upper, limits, effort[0], SEED)
+            # closed forms may miss a singular pose: the whole pose is searched before its position
+            components = Components(task.mask, task.in_tool_axes)
+            found = pose_search(space, components, (tolerances, *effort), U[rows], q[at], True)
+            q[at], family[at], error[rows] = found.q, found.family, found.error
+            residual[rows], met[rows], status[rows] = found.residual, found.valid, found.status
+    near = np.flatnonzero(thorough & ~met & (residual < NEAR))
+    if near.size and not limits and task == Task(locks=task.locks):
+        # beside a singular posture the error falls with the square of the distance
+        candidates, there = q[np.ix_(near, columns)][:, None], np.ones((near.size, 1), np.bool_)
+        found = checked(chain, U[near], candidates, there, tolerances, rough=np.inf)
+        hit, row = near[found.valid[:, 0]], found.valid[:, 0]
+        q[np.ix_(hit, columns)], residual[hit] = found.q[row, 0], found.residual[row, 0]
+        met[hit], error[hit], status[near] = True, 0.0, IGMStatus.NOT_CONVERGED
+        status[hit] = IGMStatus.REACHED
+    no_reason = status == IGMStatus.OUTSIDE_LIMITS
+    if task.relations or task.by_arm_angle:
+        no_reason |= met
+    q[no_reason], error[no_reason] = np.nan, np.nan
+    met[no_reason], status[no_reason] = False, IGMStatus.NOT_CONVERGED
+    return Outcome(q, error, residual, met, family, status)

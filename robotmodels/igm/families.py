@@ -1,24 +1,30 @@
-"""Which family serves an arm: the order in which they are tried."""
+"""Which solver serves an arm: the order in which they are tried, and the cache of prepared ones."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array
+from .. import se3
+from .._arrays import Array, read_only
+from ..geometry import REVOLUTE
+from ..kinematics.lengths import ModelCache
+from ..model import RobotModel
 from .arm_angle import prepare_arm_angle
-from .by_plan import ByPlan, is_degenerate
+from .by_plan import ByPlan, is_degenerate, prepare_by_plan
 from .chain import without_locked
 from .closed_form import ClosedForm, prepare_closed_form
 from .constraints import WHOLE, Components, Constraints, constraints
 from .elimination import prepare_elimination
-from .loop import JointChain
+from .loop import JointChain, joint_chain
 from .motion import lever
 from .postures import Postures, difference
 from .reduced import FewerJoints, Masked, OneAxis, is_aligned, prepare_reduced
-from .redundant import Redundant, prepare_redundant, redundant_joint
+from .redundant import Redundant, free_joints, prepare_redundant, redundant_joint
 from .request import Task
 from .search import ManyStarts, prepare_many_starts
 from .solver import Solver
@@ -68,19 +74,17 @@ def may_miss_solutions(
     solver: Solver, U: Array, found: Postures, references: Array
 ) -> NDArray[np.bool_]:
     """Poses at which a method has no proof that its solutions are all, (N,)."""
+    out = np.zeros(len(U), np.bool_)
+    if isinstance(solver, Redundant):
+        # a search found the nearest value of a joint
+        d = difference(solver.chain.sigma, found.q, references[:, None])
+        away = found.free & (np.abs(d) > 1e-9)
+        out = np.any(away[..., free_joints(solver)], axis=(1, 2))
+        while isinstance(solver, Redundant):
+            solver = solver.inner
     if isinstance(solver, OneAxis):
-        return ~is_aligned(solver, U) | _searches(solver.inner)
-    if not isinstance(solver, Redundant):
-        return np.full(len(U), _searches(solver))
-    joint, others = solver.joint, np.delete(np.arange(solver.chain.k), solver.joint)
-    rest = Postures(
-        found.q[..., others], found.valid, found.residual, found.double,
-        found.free[..., others], found.family,
-    )  # fmt: skip
-    out = may_miss_solutions(solver.inner, U, rest, references[:, others])
-    # a search found the nearest value of the joint
-    d = difference(solver.chain.sigma, found.q, references[:, None])[..., joint]
-    return out | np.any(found.free[..., joint] & (np.abs(d) > 1e-9), axis=1)
+        return out | ~is_aligned(solver, U) | _searches(solver.inner)
+    return out | _searches(solver)
 
 
 def may_be_reached(solver: Solver | None, U: Array, references: Array) -> NDArray[np.bool_]:
@@ -100,3 +104,76 @@ def _searches(solver: Solver) -> bool:
     if isinstance(solver, FewerJoints):
         return any(_searches(way.solver) for way in solver.ways)
     return isinstance(solver, (ManyStarts, OneAxis, Redundant))
+
+
+# --- cache ---
+
+KEPT_TASKS = 32
+"""Tasks (masks, locked values) prepared for one model that are remembered."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KnownArm:
+    """Cache of the solvers prepared for a robot.
+
+    Shapes: columns (k,); to_base (4, 4); turns, never (n,); joints (3, n); zero (1, n).
+    """
+
+    columns: NDArray[np.int64]
+    to_base: Array
+    turns: NDArray[np.bool_]
+    never: NDArray[np.bool_]
+    joints: Array
+    plan: ByPlan | None
+    numbers: Array | None
+    kernel: Callable[..., int] | None
+    instructions: NDArray[np.uint32] | None
+    most: int
+    zero: Array
+    solvers: dict[Task, Solver | None] = field(default_factory=dict)
+
+
+_ARMS = ModelCache()
+
+
+def known_arm(model: RobotModel, whole: bool = True) -> KnownArm:
+    """Cached solvers of a model, created on first use; for whole poses with the plan."""
+    return _ARMS(model, whole, lambda: _prepared(model, whole))
+
+
+def solver_for(model: RobotModel, arm: KnownArm, task: Task) -> Solver | None:
+    """Solver of a task, from the cache if possible."""
+    if task not in arm.solvers:
+        if len(arm.solvers) >= KEPT_TASKS:
+            arm.solvers.pop(next(iter(arm.solvers)))
+        arm.solvers[task] = prepare_task(joint_chain(model), task)
+    return arm.solvers[task]
+
+
+def _prepared(model: RobotModel, for_whole_poses: bool) -> KnownArm:
+    chain = joint_chain(model)
+    turns = model.table.sigma[model.table.joint_rows] == REVOLUTE
+    to_base = read_only(se3.inverse(model.base))
+    whole = Task()
+    family = prepare_task(chain, whole) if for_whole_poses else None
+    plan = None
+    if family is not None and np.array_equal(chain.columns, np.arange(model.n)):
+        plan = prepare_by_plan(chain, family)
+    joints = read_only(np.array([model.lower, model.upper, turns]))
+    numbers = None
+    if plan is not None:
+        numbers = plan.program.adapted(to_base, joints, plan.branch_of_way)
+    return KnownArm(
+        columns=chain.columns,
+        to_base=to_base,
+        turns=read_only(turns, np.bool_),
+        never=read_only(np.zeros(model.n), np.bool_),
+        joints=joints,
+        plan=plan,
+        numbers=numbers,
+        kernel=None if plan is None else plan.program.kernel,
+        instructions=None if plan is None else plan.program.plan,
+        most=0 if plan is None else plan.most,
+        zero=read_only(np.zeros((1, model.n))),
+        solvers={whole: family if plan is None else plan} if for_whole_poses else {},
+    )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import weakref
 from typing import Any, Literal
 
 import numpy as np
@@ -12,10 +11,11 @@ from .. import se3
 from .._arrays import as_count, as_mask, as_vector, batch_rows
 from ..errors import InvalidValueError
 from ..geometry import REVOLUTE
+from ..kinematics.lengths import ModelCache
 from ..model import RobotModel
 from .constraints import Components
 from .loop import joint_chain
-from .pose_search import SearchSpace, SearchTask, pose_search, search_space
+from .pose_search import SearchSpace, pose_search, search_space
 from .request import above_zero
 from .solutions import IGMSolutions
 from .solver import Tolerances
@@ -133,8 +133,8 @@ def igm_numeric(
     closest = np.clip(first, model.lower, model.upper) if limits else np.array(first)
     U = se3.inverse(model.base) @ targets.reshape(-1, 4, 4)
     components = Components(tuple(asked.tolist()), mask_axes == "tool")
-    task = SearchTask(components, tolerances, restarts, iterations)
-    found = pose_search(space, task, U, closest[:, columns], q0 is not None)
+    effort = (tolerances, restarts, iterations)
+    found = pose_search(space, components, effort, U, closest[:, columns], q0 is not None)
     closest[:, columns] = found.q
     family = np.zeros(closest.shape, np.bool_)
     family[:, columns] = found.family
@@ -160,22 +160,17 @@ def igm_numeric(
     )
 
 
-# by identity: a model's hash reads all of its numbers
-_SPACES: dict[tuple[int, bool, int], tuple[weakref.ref[RobotModel], SearchSpace]] = {}
+_SPACES = ModelCache()
 
 
 def _search_space(model: RobotModel, limits: bool, restarts: int, rng: Any) -> SearchSpace:
     """Starts of a model; those of the fixed seed are kept with it."""
-    key = (id(model), limits, restarts)
-    entry = _SPACES.get(key)
-    if rng is None and entry is not None and entry[0]() is model:
-        return entry[1]
-    seed = _SEED if rng is None else rng
-    if not isinstance(seed, np.random.Generator):
-        seed = np.random.default_rng(as_count(seed, "rng", 0))
     chain = joint_chain(model)
     lower, upper = model.lower[chain.columns], model.upper[chain.columns]
-    space = search_space(chain, lower, upper, limits, restarts, seed)
+
+    def space(seed: Any) -> SearchSpace:
+        return search_space(chain, lower, upper, limits, restarts, seed)
+
     if rng is None:
-        _SPACES[key] = weakref.ref(model, lambda _: _SPACES.pop(key, None)), space
-    return space
+        return _SPACES(model, (limits, restarts), lambda: space(_SEED))
+    return space(rng if isinstance(rng, np.random.Generator) else as_count(rng, "rng", 0))

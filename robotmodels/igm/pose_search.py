@@ -49,15 +49,6 @@ class SearchSpace(NamedTuple):
     poses: Array
 
 
-class SearchTask(NamedTuple):
-    """Requested components and tolerances, and the effort."""
-
-    components: Components
-    tolerances: Tolerances
-    restarts: int
-    iterations: int
-
-
 class Outcome(NamedTuple):
     """Configurations that meet their poses, or come closest.
 
@@ -104,13 +95,23 @@ def search_space(
 
 
 def pose_search(
-    space: SearchSpace, task: SearchTask, U: Array, first: Array, given: bool
+    space: SearchSpace,
+    components: Components,
+    effort: tuple[Tolerances, int, int],
+    U: Array,
+    first: Array,
+    given: bool,
 ) -> Outcome:
-    """Search for one configuration per pose. Shapes: U (N, 4, 4) in R_0, first (N, k)."""
+    """Search for one configuration per pose. Shapes: U (N, 4, 4) in R_0, first (N, k).
+
+    ``effort``: tolerances, starts, and iterations from each.
+    """
     k = space.chain.k
-    wanted = Constraints(space.chain, task.components, np.zeros((0, k)), np.zeros(0), space.length)
+    wanted = Constraints(space.chain, components, np.zeros((0, k)), np.zeros(0), space.length)
     chunks = [slice(n, n + CHUNK) for n in range(0, max(len(U), 1), CHUNK)]
-    parts = [_Search(space, task, wanted, U[rows], first[rows]).outcome(given) for rows in chunks]
+    parts = [
+        _Search(space, wanted, *effort, U[rows], first[rows]).outcome(given) for rows in chunks
+    ]
     return Outcome(*map(np.concatenate, zip(*parts, strict=True)))
 
 
@@ -119,18 +120,19 @@ class _Search:
     """Search for the poses of one chunk. Shapes: U (N, 4, 4), first (N, k)."""
 
     space: SearchSpace
-    task: SearchTask
     wanted: Constraints
+    tolerances: Tolerances
+    restarts: int
+    iterations: int
     U: Array
     first: Array
 
     def outcome(self, given: bool) -> Outcome:
         """Solve what can be solved, and give the reason for the rest."""
-        space, task, whole = self.space, self.task, self.wanted.weight
-        asked = task.components.asked
+        space, whole, asked = self.space, self.wanted.weight, self.wanted.components.asked
         away = self.U[:, :3, 3] - space.chain.D[0, :3, 3]
         distance = np.hypot(np.hypot(away[:, 0], away[:, 1]), away[:, 2])
-        beyond = (distance > space.reach + task.tolerances.position) & all(asked[:3])
+        beyond = (distance > space.reach + self.tolerances.position) & all(asked[:3])
         status = np.full(len(self.U), IGMStatus.NOT_CONVERGED, np.int8)
         q, limited = self.first.copy(), np.isfinite(space.limits).any()
         anywhere = np.broadcast_to(ANYWHERE, space.limits.shape)
@@ -141,7 +143,7 @@ class _Search:
             rows = np.flatnonzero((status == IGMStatus.NOT_CONVERGED) & ~beyond)
             if rows.size == 0 or (found is IGMStatus.OUTSIDE_LIMITS and not limited):
                 continue
-            starts = self._starts(rows, whole, task.restarts)
+            starts = self._starts(rows, whole, self.restarts)
             if given:
                 starts = np.concatenate([self.first[rows, None], starts], axis=1)
             x = self._descents(rows, starts, whole, GIVE_UP, bounds)[0]
@@ -176,7 +178,7 @@ class _Search:
         return used.sum(axis=1), 1.0 - np.sum((rows * used[..., None]) ** 2, axis=1)
 
     def _axes(self, rows: NDArray[np.int64]) -> Array:
-        return mask_axes(self.space.chain, self.U[rows], self.task.components)
+        return mask_axes(self.space.chain, self.U[rows], self.wanted.components)
 
     def _starts(self, rows: NDArray[np.int64], weight: Array, count: int) -> Array:
         """The starts whose poses are nearest, in this order, shape (m, count, k)."""
@@ -200,9 +202,9 @@ class _Search:
         steps: int | None = None,
     ) -> tuple[Array, Array, Array]:
         """Configurations after descents, their errors and minus the derivative of these."""
-        steps = self.task.iterations if steps is None else steps
+        steps = self.iterations if steps is None else steps
         return self.wanted.descents(
-            self.U[rows], starts, steps, patience, (), weight, bounds, self.task.tolerances
+            self.U[rows], starts, steps, patience, (), weight, bounds, self.tolerances
         )
 
     def _errors(self, rows: NDArray[np.int64], q: Array) -> tuple[Array, Array]:
@@ -212,7 +214,7 @@ class _Search:
     def _met(self, error: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Missing part of the requested position and angle, and whether both are met."""
         position, angle = self.wanted.sizes(error)
-        limits = self.task.tolerances
+        limits = self.tolerances
         return position, angle, (position <= limits.position) & (angle <= limits.orientation)
 
     def _in_range(self, rows: NDArray[np.int64], q: Array, limits: Array) -> Array:
@@ -232,10 +234,10 @@ class _Search:
         self, rows: NDArray[np.int64], q: Array
     ) -> tuple[Array, NDArray[np.int8]]:
         """Configurations at the position with the least angle missing, else closest to it."""
-        space, m, tolerance = self.space, len(rows), self.task.tolerances.position
+        space, m, tolerance = self.space, len(rows), self.tolerances.position
         whole, only = self.wanted.weight, np.arange(6) < 3
         place = np.where(only, whole, 0.0)
-        starts = self._starts(rows, place, min(SIDE_STARTS, self.task.restarts))
+        starts = self._starts(rows, place, min(SIDE_STARTS, self.restarts))
         x = np.concatenate([q[:, None], self.first[rows, None], starts], axis=1)
         S = x.shape[1]
         x, tried = x.reshape(m * S, -1), np.repeat(rows, S)
@@ -295,6 +297,6 @@ class _Search:
         status[~least] = IGMStatus.NOT_CONVERGED
         q = self._in_range(rows, q, space.limits)
         position, _, met = self._met(self._errors(rows, q)[0])
-        status[position <= self.task.tolerances.position] = IGMStatus.NOT_CONVERGED
+        status[position <= self.tolerances.position] = IGMStatus.NOT_CONVERGED
         status[met] = IGMStatus.REACHED
         return q, status.astype(np.int8)

@@ -44,7 +44,7 @@ from .._arrays.tasks import Progress, Workers
 from .._choices import one_of
 from .._outcomes import Outcome, Result
 from ..igm import IGMStatus, igm
-from ..igm.known import known_arm, solver_for
+from ..igm.families import known_arm, solver_for
 from ..igm.request import Task, poses_of
 from ..igm.solver import Tolerances, postures
 from ..kinematics import dgm
