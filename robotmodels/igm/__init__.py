@@ -7,7 +7,7 @@ calibrated ones among them (`elimination`), fewer joints or components
 (`reduced`, `position`), more of them (`redundant`, `relations`, `arm_angle`), numeric search for
 the rest (`search`). Candidates are refined and checked on the chain itself (`check`), self-motions
 are completed at the reference (`singular`), and the solutions are labelled (`branches`), sorted and
-held in `solutions`; `unreachable` says why a pose has none. `numeric` is the iterative inverse.
+held in `solutions`; `call` searches why a pose has none. `numeric` is the iterative inverse.
 """
 
 from .. import _docs

@@ -19,15 +19,15 @@ _UNLIMITED = 1e9
 
 
 class Rows(NamedTuple):
-    """Fields of an `IGMSolutions` for N poses, S rows a pose."""
+    """Fields of an `IGMSolutions` for N poses, in its order, S rows a pose."""
 
     q: Array
     valid: Flags
     residual: Array
     inside: Flags
     code: NDArray[np.int16]
-    status: NDArray[np.int8]
     labels: tuple[str, ...]
+    status: NDArray[np.int8]
     double: Flags
     free: Flags
     family: Flags
@@ -60,18 +60,11 @@ class PlanRows(NamedTuple):
         S, most = self.q.shape[1], self.most
         code = self.marks[:, 2 : 2 + most]
         free, family = np.zeros((2, len(code), most, self.q.shape[2]), np.bool_)
+        inside, double = self.marks[:, 2 + S : 2 + S + most] > 0, np.zeros(code.shape, np.bool_)
         return Rows(
-            q=self.q[:, :most],
-            valid=code >= 0,
-            residual=self.residual[:, :most],
-            inside=self.marks[:, 2 + S : 2 + S + most] > 0,
-            code=code.astype(np.int16),
-            status=self.marks[:, 1].astype(np.int8),
-            labels=self.plan.labels,
-            double=np.zeros(code.shape, np.bool_),
-            free=free,
-            family=family,
-        )
+            self.q[:, :most], code >= 0, self.residual[:, :most], inside, code.astype(np.int16),
+            self.plan.labels, self.marks[:, 1].astype(np.int8), double, free, family,
+        )  # fmt: skip
 
     def fields(self) -> tuple[Any, ...]:
         """Fields of an `IGMSolutions`."""
@@ -85,19 +78,15 @@ def result_fields(
 ) -> tuple[Any, ...]:
     """Fields of an `IGMSolutions` in their order, read-only."""
 
-    def shaped(values: NDArray[Any] | None) -> NDArray[Any] | None:
-        if values is None:
-            return None
+    def shaped(values: Any) -> Any:
+        if not isinstance(values, np.ndarray):
+            return values
         array = np.ascontiguousarray(values).reshape((*batch, *values.shape[1:]))
         array.setflags(write=False)
         return array
 
-    q, valid, residual, inside, code = map(shaped, rows[:5])
-    double, free, family, closest, missing = map(shaped, rows[7:])
-    return (
-        q, valid, residual, inside, code, rows.labels, shaped(rows.status), double, free, family,
-        method, periodic, read_only(mask, np.bool_), None, closest, missing,
-    )  # fmt: skip
+    *fields, closest, missing = map(shaped, rows)
+    return (*fields, method, periodic, read_only(mask, np.bool_), None, closest, missing)
 
 
 def arranged(
@@ -123,29 +112,20 @@ def arranged(
     inside, double = np.zeros((2, N, S), np.bool_)
     free, family = np.zeros((2, N, S, n), np.bool_)
     codes, status = np.where(found.valid, code, -1).astype(np.int64), np.zeros(N, np.int64)
+    out = q, residual, inside, double, free, family
     most = arranged_rows(
         tuple(map(np.ascontiguousarray, arrays)), columns, references, joints.ravel(), len(labels),
-        GIVEN * given | WITHIN_LIMITS * limits, codes, status,
-        (q, residual, inside, double, free, family),
+        GIVEN * given | WITHIN_LIMITS * limits, codes, status, out,
     )  # fmt: skip
+    q, residual, inside, double, free, family = (array[:, :most] for array in out)
     codes = codes[:, :most].astype(np.int16)
     last = int(codes.max(initial=0)) // len(labels)
     if labels == ("",):
         labels = tuple(str(rank + 1) for rank in range(last + 1))
     else:
         labels += tuple(f"{name} ({r + 1})" for r in range(1, last + 1) for name in labels)
-    return Rows(
-        q=q[:, :most],
-        valid=codes >= 0,
-        residual=residual[:, :most],
-        inside=inside[:, :most],
-        code=codes,
-        status=status.astype(np.int8),
-        labels=labels,
-        double=double[:, :most],
-        free=free[:, :most],
-        family=family[:, :most],
-    )
+    status = status.astype(np.int8)
+    return Rows(q, codes >= 0, residual, inside, codes, labels, status, double, free, family)
 
 
 def turned_inside(x: Array, lower: Array, upper: Array, goal: Array) -> Array:
@@ -171,7 +151,7 @@ def put(rows: Rows, at: NDArray[np.int64], part: Rows) -> Rows:
         return values
 
     nothing = {"q": np.nan, "residual": np.nan, "code": -1}
-    names = ("q", "valid", "residual", "inside", "code", "double", "free", "family")
+    names = set(Rows._fields[:10]) - {"labels", "status"}
     fields = {n: merged(getattr(rows, n), getattr(part, n), nothing.get(n, False)) for n in names}
     rows.status[at] = part.status
     found = rows._replace(labels=max(rows.labels, part.labels, key=len), **fields)

@@ -27,7 +27,7 @@ from .chain import VirtualJoint, with_virtual_joints
 from .check import checked
 from .constraints import WHOLE, Components, constraints, mask_axes
 from .loop import JointChain
-from .motion import jacobians, lever, random_postures, scaled, singular_rows, tool_poses
+from .motion import axes_of, jacobians, lever, random_postures, scaled, singular_rows, tool_poses
 from .position import prepare_position
 from .postures import MERGE, Postures, assembled, difference, no_postures, side_by_side
 from .search import classified, prepare_many_starts
@@ -234,18 +234,14 @@ def _with_one_rotation(
 ) -> Solver | None:
     """Prepare for a mask that frees two rotations."""
     search = prepare_many_starts(constraints(chain, components))
-    R, axes = np.eye(3), []
-    for j in range(chain.k):
-        R = R @ chain.D[j, :3, :3]
-        if chain.sigma[j] == 0:
-            axes.append(R[:, 2])
     # with all joints at zero: axes of parallel joints do not move
+    zero = np.zeros((1, chain.k))
+    axes, R = axes_of(chain, zero)[0][chain.sigma == 0, 0], tool_poses(chain, zero)[0]
     index = int(np.flatnonzero(components.asked[3:])[0])
-    R = R @ chain.D[chain.k, :3, :3]
-    asked = R[:, index] if components.in_tool_axes else chain.base[index, :3]
+    asked = R[:3, index] if components.in_tool_axes else chain.base[index, :3]
     slides = set(components.freed_translations)
     if (
-        not axes
+        not len(axes)
         or np.linalg.norm(np.cross(axes, asked), axis=1).max() > 1e-9
         or (components.in_tool_axes and not slides <= {index})
     ):
