@@ -8,6 +8,7 @@ import pytest
 from identities.chain_search import apart, draw, missing, searched
 
 import robotmodels as rm
+from robotmodels.igm.constraints import constraints
 from robotmodels.igm.families import prepare
 from robotmodels.igm.kernels.singular import curve
 from robotmodels.igm.loop import JointChain, joint_chain
@@ -122,7 +123,7 @@ def test_a_closed_curve_ends_where_it_began(rng):
     q = draw(chain, 1, rng)
     q[:, 1] = 0.0
     U, points = poses(chain, q)[0], np.empty((2, 600, 6))
-    along = SelfMotions(chain.sigma, chain.D, U, np.zeros(6)).directions(q[0], 0)[0][0]
+    along = SelfMotions(constraints(chain), U, np.zeros(6)).directions(q[0], 0)[0][0]
     count, closed = curve(chain.sigma, chain.D, U, q[0], along, 0, *points)
     assert closed
     gap = (points[0, count - 1] - q[0]) / (2 * np.pi)

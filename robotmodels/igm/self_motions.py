@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 
 from .._arrays import Array
 from .check import bits_of
+from .constraints import Constraints
 from .postures import difference
+from .search import nearest_value
 
 SAME = 1e-6
 """Postures closer than this in every joint are equal; joints that move less stand still."""
@@ -47,8 +49,7 @@ class Member:
 class SelfMotions:
     """Self-motions of one pose, in units of the arm. Shapes: references (k,)."""
 
-    sigma: NDArray[np.int64]
-    D: Array
+    wanted: Constraints
     U: Array
     references: Array
     curves: list[tuple[int, Array, Array]] = field(default_factory=list)
@@ -92,6 +93,16 @@ class SelfMotions:
                 if len(basis) == null:
                     break  # no fold and no crossing: one surface through this posture
         return ends or ([(q, 0, 0, False)] if rejected else [])
+
+    @property
+    def sigma(self) -> NDArray[np.int64]:
+        """Types of the joints."""
+        return self.wanted.chain.sigma
+
+    @property
+    def D(self) -> Array:
+        """Constants between the joints."""
+        return self.wanted.chain.D
 
     # --- compiled steps ---
 
@@ -313,43 +324,14 @@ class SelfMotions:
         return rows[sizes > 0.3]
 
     def drive(self, item: Member, q: Array, basis: Array) -> None:
-        """Drive the first joint that moves to its reference both ways; queue what is reached."""
+        """Queue the member at the reference of the first joint that moves, or nearest to it."""
         moves = np.max(np.abs(basis), axis=0) > SAME
         joint = int(np.argmax(moves))
-        ends = [self.driven(q, item.held, len(basis), joint, sense) for sense in (1.0, -1.0)]
-        self.add_nearest(item, ends, moves)
-
-    def driven(
-        self, q: Array, held: int, rank: int, joint: int, sense: float
-    ) -> tuple[Array, float]:
-        """Move until a joint has its reference, or turns round; how far from it this is."""
-        slides, along = self.sigma[joint] == 1, np.zeros(q.size)
-        left, h, along[joint] = -sense * self.offset(q, joint), 0.1, sense
-        if left < -1e-12:
-            if slides:
-                return q, -left
-            left += 2.0 * np.pi
-        while left > 1e-9 and h > 1e-7:
-            v = self.tangent(q, held, rank, along)
-            speed = sense * float(v[joint])
-            if speed < 1e-7:
-                break
-            step = min(h, left / speed)
-            y, error = self.corrected(q + step * v, held, rank)
-            gone = sense * float(y[joint] - q[joint])
-            if error > MEMBER or gone <= 0.0 or np.linalg.norm(y - q - step * v) > 0.25 * step:
-                h = 0.5 * step
-                continue
-            q, left = y, left - gone
-            h = min(1.5 * h, 1.0 if slides else 0.1)
-        away = abs(self.offset(q, joint))
-        if away <= SAME:
-            start = np.array(q)
-            start[joint] -= self.offset(q, joint)
-            y, error = self.corrected(start, held | 1 << joint, rank - 1)
-            if error <= MEMBER:
-                return y, 0.0
-        return q, away
+        held = [m for m in range(q.size) if (item.held >> m) & 1 == 1]
+        value = self.references[[joint]]
+        end = nearest_value(self.wanted, self.U[None], q[None], joint, value, held)[0]
+        away = abs(self.offset(end, joint))
+        self.add_nearest(item, [(end, away if away > SAME else 0.0)], moves)
 
 
 def _eliminated(basis: Array, start: int) -> Array:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from .._arrays import Array
 from .chain import canonical_frames
 from .check import bits_of, checked
+from .constraints import WHOLE, Constraints
 from .loop import JointChain
 from .motion import jacobians, lever
 from .postures import Postures
@@ -96,14 +97,15 @@ def complete(
     six joints all are found.
     """
     k = chain.k
-    sigma, D, lengths, goals, q = _in_units(chain, U, found)
+    scaled, lengths, goals, q = _in_units(chain, U, found)
+    wanted = Constraints(scaled, WHOLE, np.zeros((0, k)), np.zeros(0), 1.0)
     double, member, bits = found.double.copy(), found.family & found.valid, bits_of(found.free)
     moving, kept = np.zeros(bits.shape, np.int64), []
     at, motions = np.argwhere(found.valid), {}
-    J = jacobians(replace(chain, D=D), q[found.valid])
+    J = jacobians(scaled, q[found.valid])
     near = np.linalg.svd(J, compute_uv=False)[:, -1] < NEAR
     for n, s in at[near | member[found.valid]]:
-        motion = motions.setdefault(n, SelfMotions(sigma, D, goals[n], references[n] / lengths))
+        motion = motions.setdefault(n, SelfMotions(wanted, goals[n], references[n] / lengths))
         moving[n, s] = motion.moving_joints(q[n, s], int(bits[n, s]))
         member[n, s] |= moving[n, s] != 0
         if moving[n, s] == 0:
@@ -136,13 +138,13 @@ def complete(
 
 def _in_units(
     chain: JointChain, U: Array, found: Postures
-) -> tuple[NDArray[np.int64], Array, Array, Array, Array]:
-    """Joint types, constants, lengths of the joints' units, poses, postures in units of the arm."""
+) -> tuple[JointChain, Array, Array, Array]:
+    """Chain, lengths of the joints' units, poses and postures in units of the arm."""
     D, unit = canonical_frames(chain)
     lengths, goals = np.where(chain.sigma == 1, unit, 1.0), np.array(U, order="C")
     goals[:, :3, 3] /= unit
-    q = _filled(found.q, found.valid) / lengths
-    return np.ascontiguousarray(chain.sigma), D, lengths, goals, q
+    sigma = np.ascontiguousarray(chain.sigma)
+    return replace(chain, sigma=sigma, D=D), lengths, goals, _filled(found.q, found.valid) / lengths
 
 
 def _flags(bits: NDArray[np.int64], k: int) -> NDArray[np.bool_]:
