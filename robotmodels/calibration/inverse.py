@@ -15,13 +15,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 
 from .. import se3
-from .._arrays import Array, Frozen, as_mask, as_vector, batch_rows
+from .._arrays import Array, Frozen, as_mask, as_number, as_vector, batch_rows
 from ..errors import InvalidValueError
 from ..geometry import REVOLUTE
 from ..igm import igm
 from ..igm.arrange import arranged, result_fields, turned_inside
 from ..igm.postures import MERGE, Postures, difference
-from ..igm.request import above_zero, locks_of
+from ..igm.request import locks_of
 from ..igm.solutions import IGMSolutions, of_fields
 from ..kinematics import dgm, jacobian
 from ..kinematics.lengths import characteristic_length
@@ -86,7 +86,7 @@ def corrected_igm(
     """
     robot = as_calibrated(robot)
     model, n, errors = robot.model, robot.model.n, robot.joint_errors
-    tolerance = above_zero(tolerance, "tolerance")
+    tolerance = as_number(tolerance, "tolerance", above=0.0)
     requested, locks = as_mask(mask), dict(locks_of(model, lock))
     poses, given = se3.as_pose(T), q_ref is not None
     reference = np.zeros(n) if q_ref is None else as_vector(q_ref, n, "q_ref").copy()
@@ -337,7 +337,7 @@ def joint_offsets(
     if length is None:
         away = np.linalg.norm(wanted[:, :3, 3] - robot.nominal.base[:3, 3], axis=1)
         length = float(away.mean()) or 1.0
-    length = above_zero(length, "length")
+    length = as_number(length, "length", above=0.0)
     weight = np.where(requested, np.repeat([1.0, length], 3), 0.0)
     revolute = robot.model.table.sigma[robot.model.table.joint_rows] == REVOLUTE
     unit = np.where(revolute, 1.0, length)

@@ -23,7 +23,7 @@ from .paul.layout import GIVEN, NEEDS_CHECK, WITHIN_LIMITS
 from .pose_search import Outcome, pose_search, search_space
 from .postures import Postures, no_postures
 from .redundant import Redundant
-from .request import FARTHEST, WHOLE_POSE, Task, above_zero, locks_of, poses_of, relations_of
+from .request import FARTHEST, WHOLE_POSE, Task, locks_of, options_of, poses_of, relations_of
 from .singular import complete
 from .solutions import IGMSolutions, later, of_fields
 from .solver import Solver, Tolerances, postures
@@ -82,16 +82,7 @@ def solved(
         quick = _unchecked(model, T, q_ref)
         if quick is not None and quick.most >= 0:
             return later(quick)
-    if not isinstance(model, RobotModel):
-        raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}.")
-    if mask_axes not in ("world", "tool"):
-        raise InvalidValueError(f"mask_axes: expected 'world' or 'tool', got {mask_axes!r}.")
-    if not isinstance(limits, (bool, np.bool_)):
-        raise InvalidValueError(f"limits: expected True or False, got {limits!r}.")
-    tolerances = Tolerances(
-        above_zero(position_tolerance, "position_tolerance"),
-        above_zero(orientation_tolerance, "orientation_tolerance"),
-    )
+    tolerances = options_of(model, mask_axes, limits, position_tolerance, orientation_tolerance)
     if relations is not None and not mask is lock is arm_angle is None:
         raise InvalidValueError(
             "relations: not together with mask, lock or arm_angle; a locked joint is a "

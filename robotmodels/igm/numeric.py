@@ -16,9 +16,8 @@ from ..model import RobotModel
 from .constraints import Components
 from .loop import joint_chain
 from .pose_search import SearchSpace, pose_search, search_space
-from .request import above_zero
+from .request import options_of
 from .solutions import IGMSolutions
-from .solver import Tolerances
 
 METHOD = "numeric (Levenberg-Marquardt)"
 """Name of the method in results."""
@@ -106,20 +105,10 @@ def igm_numeric(
     >>> igm_numeric(trr, B).reason()
     'The position is reached, but the orientation is not available there. It is off by 180 deg.'
     """
-    if not isinstance(model, RobotModel):
-        raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}.")
-    T = se3.as_pose(T)
-    asked = as_mask(mask)
-    if mask_axes not in ("world", "tool"):
-        raise InvalidValueError(f"mask_axes: expected 'world' or 'tool', got {mask_axes!r}.")
-    tolerances = Tolerances(
-        above_zero(position_tolerance, "position_tolerance"),
-        above_zero(orientation_tolerance, "orientation_tolerance"),
-    )
+    tolerances = options_of(model, mask_axes, limits, position_tolerance, orientation_tolerance)
+    T, asked = se3.as_pose(T), as_mask(mask)
     restarts = as_count(restarts, "restarts", 0)
     iterations = as_count(iterations, "iterations", 1)
-    if not isinstance(limits, (bool, np.bool_)):
-        raise InvalidValueError(f"limits: expected True or False, got {limits!r}.")
     if restarts == 0 and q0 is None:
         raise InvalidValueError("restarts: 0 leaves no start without q0; give q0 or restarts.")
     space = _search_space(model, bool(limits), restarts, rng)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf, isfinite
-from numbers import Real
 from operator import index
 from typing import Any
 
@@ -13,10 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, as_floats
+from .._arrays import Array, as_floats, as_number
 from ..errors import InvalidValueError, ShapeError, nearest_names
-from ..model import RobotModel
+from ..model import RobotModel, check_model
 from .loop import joint_chain
+from .solver import Tolerances
 
 WHOLE_POSE = (True,) * 6
 FARTHEST = 1e6
@@ -48,14 +47,19 @@ def poses_of(T: ArrayLike) -> Array:
     return poses
 
 
-def above_zero(value: Any, name: str) -> float:
-    """A finite number above 0, or an error that names the argument."""
-    if not isinstance(value, (Real, np.number)) or isinstance(value, bool):
-        raise InvalidValueError(f"{name}: expected a number, got {value!r}.")
-    number = float(value)
-    if not 0.0 < number < inf:
-        raise InvalidValueError(f"{name}: expected a finite number above 0, got {number}.")
-    return number
+def options_of(
+    model: Any, mask_axes: Any, limits: Any, position_tolerance: Any, orientation_tolerance: Any
+) -> Tolerances:
+    """Tolerances of a call, whose options are checked."""
+    check_model(model)
+    if mask_axes not in ("world", "tool"):
+        raise InvalidValueError(f"mask_axes: expected 'world' or 'tool', got {mask_axes!r}.")
+    if not isinstance(limits, (bool, np.bool_)):
+        raise InvalidValueError(f"limits: expected True or False, got {limits!r}.")
+    return Tolerances(
+        as_number(position_tolerance, "position_tolerance", above=0.0),
+        as_number(orientation_tolerance, "orientation_tolerance", above=0.0),
+    )
 
 
 def locks_of(
@@ -92,12 +96,7 @@ def locks_of(
                 )
         if column in columns:
             raise InvalidValueError(f"lock: joint {joint!r} is given twice.")
-        number = isinstance(value, (Real, np.number)) and not isinstance(value, bool)
-        if not number or not isfinite(value):
-            raise InvalidValueError(
-                f"lock: expected one finite number for joint {joint!r}, got {value!r}."
-            )
-        columns[column] = float(value)
+        columns[column] = as_number(value, f"lock: joint {joint!r}")
     return tuple(sorted(columns.items()))
 
 
