@@ -117,7 +117,8 @@ def arranged(
         tuple(map(np.ascontiguousarray, arrays)), columns, references, joints.ravel(), len(labels),
         GIVEN * given | WITHIN_LIMITS * limits, codes, status, out,
     )  # fmt: skip
-    q, residual, inside, double, free, family = (array[:, :most] for array in out)
+    q, residual = (array[:, :most] for array in out[:2])
+    inside, double, free, family = (array[:, :most] for array in out[2:])
     codes = codes[:, :most].astype(np.int16)
     last = int(codes.max(initial=0)) // len(labels)
     if labels == ("",):

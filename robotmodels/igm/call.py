@@ -14,13 +14,13 @@ from ..model import RobotModel
 from .arm_angle import ArmAngle, arm_angle_postures
 from .arrange import PlanRows, Rows, arranged, put, result_fields
 from .branches import branches
-from .chain import far_along_rails, without_locked
+from .chain import far_along_rails
 from .check import checked
 from .constraints import Components, constraints
 from .families import KnownArm, known_arm, may_be_reached, may_miss_solutions, solver_for
-from .loop import JointChain, joint_chain
+from .loop import JointChain
 from .paul.layout import GIVEN, NEEDS_CHECK, WITHIN_LIMITS
-from .pose_search import Outcome, pose_search, search_space
+from .pose_search import Outcome, pose_search, space_of
 from .postures import Postures, no_postures
 from .redundant import Redundant
 from .request import FARTHEST, WHOLE_POSE, Task, locks_of, options_of, poses_of, relations_of
@@ -36,7 +36,6 @@ REASON = (4, 60)
 """Starts and steps of the search that only looks for the reason why a pose has no solution."""
 THOROUGH = (100, 40)
 """The same where no method proves that there is none."""
-SEED = 20
 NEAR = 1e-5
 """Error up to which a closest posture says nothing of the reach: it is refined [m, rad]."""
 
@@ -316,21 +315,20 @@ def diagnose(
     Shapes: thorough (N,); U (N, 4, 4) in R_0, references (N, n). A search that met a pose outside
     the limits, or without the relations or the arm angle, proves nothing: NaN, not converged.
     """
-    chain = without_locked(joint_chain(model), task.locks)
-    columns, N = chain.columns, len(U)
-    lower, upper = model.lower[columns], model.upper[columns]
+    N, components = len(U), Components(task.mask, task.in_tool_axes)
     q, family = references.copy(), np.zeros(references.shape, np.bool_)
     error, residual = np.empty((N, 6)), np.empty(N)
     met, status = np.empty(N, np.bool_), np.empty(N, np.int8)
-    for rows, effort in (
+    for rows, (starts, steps) in (
         (np.flatnonzero(~thorough), REASON), (np.flatnonzero(thorough), THOROUGH),
     ):  # fmt: skip
+        space = space_of(model, limits, starts, None, task.locks)
+        chain, columns = space.chain, space.chain.columns
         if rows.size:
             at = np.ix_(rows, columns)
-            space = search_space(chain, lower, upper, limits, effort[0], SEED)
             # closed forms may miss a singular pose: the whole pose is searched before its position
-            components = Components(task.mask, task.in_tool_axes)
-            found = pose_search(space, components, (tolerances, *effort), U[rows], q[at], True)
+            effort = tolerances, starts, steps
+            found = pose_search(space, components, effort, U[rows], q[at], True)
             q[at], family[at], error[rows] = found.q, found.family, found.error
             residual[rows], met[rows], status[rows] = found.residual, found.valid, found.status
     near = np.flatnonzero(thorough & ~met & (residual < NEAR))

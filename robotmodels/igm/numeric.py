@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,17 +11,14 @@ from .. import se3
 from .._arrays import as_count, as_mask, as_vector, batch_rows
 from ..errors import InvalidValueError
 from ..geometry import REVOLUTE
-from ..kinematics.lengths import ModelCache
 from ..model import RobotModel
 from .constraints import Components
-from .loop import joint_chain
-from .pose_search import SearchSpace, pose_search, search_space
+from .pose_search import pose_search, space_of
 from .request import options_of
 from .solutions import IGMSolutions
 
 METHOD = "numeric (Levenberg-Marquardt)"
 """Name of the method in results."""
-_SEED = 20
 
 
 def igm_numeric(
@@ -111,7 +108,7 @@ def igm_numeric(
     iterations = as_count(iterations, "iterations", 1)
     if restarts == 0 and q0 is None:
         raise InvalidValueError("restarts: 0 leaves no start without q0; give q0 or restarts.")
-    space = _search_space(model, bool(limits), restarts, rng)
+    space = space_of(model, bool(limits), restarts, rng)
     columns, n = space.chain.columns, model.n
     middle = np.zeros(n)
     if limits:
@@ -147,19 +144,3 @@ def igm_numeric(
         error=found.error.reshape(*rows, 6),
         closest=closest.reshape(*batch, n),
     )
-
-
-_SPACES = ModelCache()
-
-
-def _search_space(model: RobotModel, limits: bool, restarts: int, rng: Any) -> SearchSpace:
-    """Starts of a model; those of the fixed seed are kept with it."""
-    chain = joint_chain(model)
-    lower, upper = model.lower[chain.columns], model.upper[chain.columns]
-
-    def space(seed: Any) -> SearchSpace:
-        return search_space(chain, lower, upper, limits, restarts, seed)
-
-    if rng is None:
-        return _SPACES(model, (limits, restarts), lambda: space(_SEED))
-    return space(rng if isinstance(rng, np.random.Generator) else as_count(rng, "rng", 0))

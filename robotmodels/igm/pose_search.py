@@ -14,14 +14,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, read_only
+from .._arrays import Array, as_count, read_only
+from ..kinematics.lengths import ModelCache
+from ..model import RobotModel
+from .chain import without_locked
 from .constraints import Components, Constraints, mask_axes
-from .loop import JointChain
+from .loop import JointChain, joint_chain
 from .motion import cross, jacobians, tool_poses
 from .solver import Tolerances
 from .status import IGMStatus
 
 CHUNK = 1024  # poses worked on at a time
+SEED = 20
 RANK_STARTS = 8  # random configurations whose Jacobians give the rank of a task
 GIVE_UP = 0.7  # share of the cost left after five steps above which another start is better
 STIFF = (1e3, 1e5)  # weights of the position while the least orientation error is looked for
@@ -92,6 +96,30 @@ def search_space(
         starts=read_only(starts),
         poses=read_only(tool_poses(chain, starts)),
     )
+
+
+_SPACES = ModelCache()
+
+
+def space_of(
+    model: RobotModel,
+    limits: bool,
+    restarts: int,
+    rng: object = None,
+    locks: tuple[tuple[int, float], ...] = (),
+) -> SearchSpace:
+    """Starts of a model, some joints locked; those of the fixed seed are kept with the model."""
+
+    def space(seed: object) -> SearchSpace:
+        chain = without_locked(joint_chain(model), locks)
+        lower, upper = model.lower[chain.columns], model.upper[chain.columns]
+        return search_space(chain, lower, upper, limits, restarts, seed)
+
+    if rng is None and not locks:
+        return _SPACES(model, (limits, restarts), lambda: space(SEED))
+    if rng is None or isinstance(rng, np.random.Generator):
+        return space(SEED if rng is None else rng)
+    return space(as_count(rng, "rng", 0))
 
 
 def pose_search(
