@@ -35,7 +35,7 @@ def solved(name, kept):
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=() if name in ("rx90", "ur5") else pytest.mark.nightly)
+        pytest.param(name, marks=() if name in ("rx90", "ur5", "crx10ia") else pytest.mark.nightly)
         for name in FROZEN["singular"]
     ],
 )

@@ -5,15 +5,11 @@ from functools import cache
 import numpy as np
 import pytest
 from identities.chain_search import apart, draw, searched
-from scipy.optimize import brentq
 
 import robotmodels as rm
 from robotmodels.igm.elimination import elimination_solutions, prepare_elimination
 from robotmodels.igm.loop import JointChain, joint_chain
-from robotmodels.igm.motion import jacobians
 from robotmodels.igm.motion import tool_poses as poses
-from robotmodels.igm.singular import complete
-from robotmodels.igm.solver import Tolerances, postures
 from robotmodels.robots import load
 
 REVOLUTE = (0, 0, 0, 0, 0, 0)
@@ -168,63 +164,6 @@ def test_the_count_is_that_of_an_independent_search(seed, sigma, rng):
 
 
 # --- singular poses ------------------------------------------------------------------------------
-
-
-def singular_postures(chain, N, rng):
-    """Postures with det J = 0 and a direction that leaves the singularity, ``(N, 6)`` each."""
-
-    def determinant(q):
-        return np.linalg.det(jacobians(chain, q[None])[0])
-
-    found = []
-    while len(found) < N:
-        a = rng.uniform(-np.pi, np.pi, 6)
-        b = a + rng.uniform(-1.0, 1.0, 6)
-        if determinant(a) * determinant(b) < 0:
-            t = brentq(lambda t, a=a, b=b: determinant(a + t * (b - a)), 0.0, 1.0, xtol=1e-15)
-            q = a + t * (b - a)
-            found.append((q, (b - a) / np.max(np.abs(b - a))))
-    return np.swapaxes(np.array(found), 0, 1)
-
-
-def left_open(chain, q, tolerance=1e-13, step=1e-4):
-    """How far from postures (N, 6) near a fold the pose is still met to a tolerance.
-
-    Along the null direction v it is missed by ``s sigma + s^2 h / 2``, with h the curvature: at
-    the other root too, if nowhere between the two by more than the tolerance.
-    """
-    u, sigma, v = np.linalg.svd(jacobians(chain, q))
-    ahead, behind = (jacobians(chain, q + d * v[:, -1]) for d in (step, -step))
-    h = np.abs(np.einsum("ni,nij,nj->n", u[..., -1], ahead - behind, v[:, -1])) / (2.0 * step)
-    s, square = sigma[:, -1], 2.0 * h * tolerance
-    beside = 2.0 * tolerance / np.maximum(s, np.sqrt(square))
-    return np.where(s**2 < square, (s + np.sqrt(s**2 + square)) / h, beside)
-
-
-@pytest.mark.sampled(4)
-@pytest.mark.parametrize("eps", [0.0, 1e-9, 1e-6, 1e-5, 1e-4, 1e-3])
-@pytest.mark.parametrize("chain", [random_arm(0), arm("xarm6")], ids=["random", "xarm6"])
-def test_near_singular_poses(chain, eps):
-    q0, away = singular_postures(chain, 40, np.random.default_rng(8))
-    q0 = q0 + eps * away
-    q0 = np.remainder(q0 + np.pi, 2 * np.pi) - np.pi
-    U = poses(chain, q0)
-    none = np.zeros(q0.shape)
-    found = postures(solver_of(chain), U, none, Tolerances())
-    found = complete(chain, U, found, none, Tolerances())
-    q, valid, double = found.q, found.valid, found.double
-    check(chain, U, q, valid)
-    reach = left_open(chain, q0)
-    assert lost(chain, q0, q, valid, within=reach) == 0
-    if eps == 0.0:
-        # one that is double, or where rounding splits the fold two that are as near as that
-        away = apart(chain, np.nan_to_num(q), q0[:, None])
-        near = valid & (away < 2.0 * reach[:, None])
-        assert ((near & double).any(axis=1) | (near.sum(axis=1) >= 2)).all()
-        assert np.count_nonzero(double.any(axis=1)) >= 38
-    if eps >= 1e-4:
-        assert not double.any()
-        assert np.all(valid.sum(axis=1) % 2 == 0)
 
 
 @pytest.mark.parametrize(("eps", "share"), [(1e-5, 0.15), (1e-4, 0.02), (3e-4, 0.0)])

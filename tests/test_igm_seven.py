@@ -262,23 +262,6 @@ def test_other_arms_have_no_arm_angle():
     assert prepare_arm_angle(JointChain(chain.columns, chain.sigma, D, chain.base)) is None
 
 
-def test_a_rounded_table_counts_as_structured_and_is_solved_exactly():
-    chain, _ = arm("iiwa14")
-    rng = np.random.default_rng(11)
-    D = np.array(chain.D)
-    D[1:7, :3, 3] += 3e-7 * rng.uniform(-1, 1, (6, 3))
-    D[1:7, :3, :3] = D[1:7, :3, :3] @ [se3.rotation("x", a)[:3, :3] for a in rng.normal(0, 1e-7, 6)]
-    rounded = JointChain(chain.columns, chain.sigma, D, chain.base)
-    solver = prepare_arm_angle(rounded)
-    q = random_postures(400, seed=12)
-    q = q[np.all(np.abs(np.sin(q[:, [1, 3, 5]])) > 0.2, axis=1)]
-    U = poses(rounded, q)
-    found = at_angles(solver, U, arm_angle_of(solver, q)[:, None])
-    assert np.all(found.valid.sum(axis=-1) == 8)
-    assert found.residual.max() < 1e-12
-    assert np.nanmin(gaps(found.q[:, 0], q), axis=1).max() < 1e-4
-
-
 # --- locked joints -------------------------------------------------------------------------------
 
 LOCKED = [
