@@ -85,3 +85,22 @@ def _words(latex: str) -> str:
     for typeset, letter in _LETTERS:
         words = words.replace(typeset, letter)
     return words
+
+
+class Explanation:
+    """Base of explanations: printing one shows the derivation."""
+
+    __slots__ = ()
+    text: str
+    latex: str
+
+    def __str__(self) -> str:
+        return self.text
+
+    def _repr_markdown_(self) -> str:
+        """Form of a notebook."""
+        return markdown(self.latex)
+
+    def _repr_latex_(self) -> str:
+        """Form of a notebook that is converted to LaTeX."""
+        return self.latex

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
 from .._arrays import Array, read_only
+from .chain import motion
 from .check import checked
 from .loop import JointChain
 from .motion import cross
@@ -72,13 +73,13 @@ def prepare_arm_angle(chain: JointChain) -> ArmAngle | None:
     shoulder_height, wrist_height = _centre(D[1], D[2]), _centre(D[5], D[6])
     if shoulder_height is None or wrist_height is None:
         return None
-    # a centre seen from its outer joints lies on their axes, whatever their angles
-    S = np.array([0.0, 0.0, shoulder_height, 1.0])
-    W = np.array([0.0, 0.0, wrist_height, 1.0])
-    shoulder = D[0] @ _on_axis(D[1] @ S)
-    wrist = se3.inverse(D[7]) @ _on_axis(se3.inverse(D[6]) @ W)
-    before = se3.inverse(D[3]) @ _on_axis(se3.inverse(D[2]) @ S)
-    behind = D[4] @ _on_axis(D[5] @ W)
+    S, W = np.array([0.0, 0.0, shoulder_height, 1.0]), np.array([0.0, 0.0, wrist_height, 1.0])
+    back = se3.inverse(D)
+    # a centre seen from its outer joints lies on their axes, whatever their angles: rounding
+    # across them is taken off
+    on_axis = np.diag([0.0, 0.0, 1.0, 1.0])
+    shoulder, before = D[0] @ on_axis @ D[1] @ S, back[3] @ on_axis @ back[2] @ S
+    wrist, behind = back[7] @ on_axis @ back[6] @ W, D[4] @ on_axis @ D[5] @ W
     points = np.array([before[:3], behind[:3]])
     if min(np.hypot(points[:, 0], points[:, 1])) < MEETING:
         return None  # the elbow does not change the distance
@@ -123,7 +124,9 @@ def arm_angle_postures(
     # the arm angle gives the rotation of the upper arm
     no_line = length < NO_LINE
     unit = np.where(no_line[:, None], [0.0, 0.0, 1.0], line / np.maximum(length, 1e-300)[:, None])
-    axes = _reference_axes(unit) @ _turns(psi, (1, 2))
+    _, zero, normal = np.moveaxis(_reference_axes(unit), -1, 0)
+    elbow = np.cos(psi)[:, None] * zero + np.sin(psi)[:, None] * normal
+    axes = np.stack([unit, elbow, cross(unit, elbow)], axis=-1)
     upper = axes[:, None] @ np.swapaxes(_upper_arm(solver, q4)[0], -1, -2)
     # without a line it may point anywhere: the shoulder stays at its reference
     upper[no_line] = _rotation_of_the_upper_arm(solver, references[no_line])[:, None]
@@ -193,15 +196,9 @@ def _rotation_of_the_upper_arm(solver: ArmAngle, q: Array) -> Array:
     return R[0] @ _turns(q[..., 0]) @ R[1] @ _turns(q[..., 1]) @ R[2] @ _turns(q[..., 2]) @ R[3]
 
 
-def _turns(angle: Array, plane: tuple[int, int] = (0, 1)) -> Array:
-    """Rotations (..., 3, 3) in a plane of two axes, about z by default."""
-    i, j = plane
-    R = np.zeros((*angle.shape, 3, 3))
-    R[...] = np.eye(3)
-    R[..., i, i] = R[..., j, j] = np.cos(angle)
-    R[..., j, i] = np.sin(angle)
-    R[..., i, j] = -R[..., j, i]
-    return R
+def _turns(angle: Array) -> Array:
+    """Rotations (..., 3, 3) about z."""
+    return motion(0, angle)[..., :3, :3]
 
 
 def _type_2(X: Array, Y: Array, Z: Array, slack: Array, zero: float) -> tuple[Array, Flags, Flags]:
@@ -259,8 +256,3 @@ def _centre(E: Array, G: Array) -> float | None:
             return None
         heights.append(float(nearest[2]))
     return None if abs(heights[0] - heights[1]) > MEETING else 0.5 * sum(heights)
-
-
-def _on_axis(point: Array) -> Array:
-    """The point with its rounding across the z axis taken off."""
-    return np.array([0.0, 0.0, point[2], 1.0])

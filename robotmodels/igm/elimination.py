@@ -5,6 +5,11 @@ wrist or three parallel axes its equations become dependent. Pieper's and Paul's
 those arms; a self-test tells whether this one may. Where two solutions are one within rounding
 all forms are tried; self-motions are not followed.
 
+Of the loop of six joints any may be the one that drops out, its two neighbours to one side the pair
+that is eliminated linearly, and of the other three an outer one gives the eigenvalues: 24 forms.
+They are equal in theory and far from it in rounding: all are tried on random poses, and the best
+are kept.
+
 References
 ----------
 M. Raghavan and B. Roth, "Inverse kinematics of the general 6R manipulator and related linkages",
@@ -20,19 +25,48 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .. import se3
 from .._arrays import Array, read_only
 from .chain import canonical_frames
 from .check import checked
 from .closed_form import prepare_closed_form
-from .elimination_forms import Form, Roots, ranked_forms, solve_form
 from .loop import JointChain
 from .motion import jacobians, random_postures, tool_poses
-from .postures import Postures
+from .postures import Postures, difference
 from .solver import Prepare, Solver, Tolerances, postures, prepare_alike
 
 MOST = 16  # solutions a six-joint arm can have at one pose
 CHUNK = 256  # poses worked on at a time: 2 MB of equations
 TESTS = 48  # random poses of the self-test
+TOLERANCE = 1e-13  # residual of a solution [m, or the arm's length if that is more; rad]
+POOR = 1e-9  # quality of the elimination below which another form is tried as well
+ROUGH = 1e-4  # distance by which polishing moved a solution above which another form is tried [rad]
+ROOM = 48  # rows while solving: a self-motion takes any number, and must leave some
+KEPT = 12  # forms kept
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Form:
+    """One form of the loop. Shapes: joints, kinds (6,)."""
+
+    joints: NDArray[np.int64]
+    kinds: NDArray[np.int64]
+    direction: int
+    swapped: bool
+
+
+def all_forms(sigma: NDArray[np.int64]) -> list[Form]:
+    """The 24 forms without those that put a prismatic joint where none may be."""
+    found = []
+    for direction in (1, -1):
+        for start in range(6):
+            joints = (start + direction * np.arange(6)) % 6
+            kinds = sigma[joints]
+            # the eigenvalue is an angle, and only a revolute joint leaves a line in place
+            if kinds[2] == 0 and kinds[5] == 0:
+                joints, kinds = read_only(joints, np.int64), read_only(kinds, np.int64)
+                found += [Form(joints, kinds, direction, swapped) for swapped in (False, True)]
+    return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,15 +97,13 @@ def prepare_elimination(chain: JointChain) -> EliminationArm | None:
     rng = np.random.default_rng(0)
     arm = with_forms_of((), chain)
     few, many = (random_postures(arm.scaled, N, rng) for N in (8, TESTS))
-    forms = ranked_forms(arm.scaled, arm.unit, tool_poses(arm.scaled, few))
-    if not forms:
+    arm = replace(arm, forms=_ranked_forms(arm, tool_poses(arm.scaled, few)))
+    if not arm.forms:
         return None
-    arm, poses = replace(arm, forms=forms), tool_poses(arm.scaled, many)
-    found = _solved(arm, poses)
-    away = found.q - many[:, None]
-    away -= 2.0 * np.pi * np.where(chain.sigma == 0, np.rint(away / (2.0 * np.pi)), 0.0)
-    nearest = np.min(np.where(found.present, np.abs(away).max(axis=2), np.inf), axis=1)
-    return replace(arm, missed=int(np.sum((nearest > 1e-5) | (found.count % 2 == 1))))
+    q, count = _solved(arm, tool_poses(arm.scaled, many))
+    away = np.abs(difference(chain.sigma, q, many[:, None])).max(axis=2)
+    nearest = np.min(away, axis=1, where=_present(count), initial=np.inf)
+    return replace(arm, missed=int(np.sum((nearest > 1e-5) | (count % 2 == 1))))
 
 
 def with_forms_of(forms: tuple[Form, ...], chain: JointChain) -> EliminationArm:
@@ -88,13 +120,13 @@ def elimination_solutions(arm: EliminationArm, U: ArrayLike) -> tuple[Array, NDA
     q, valid = np.full((len(poses), MOST, 6), np.nan), np.zeros((len(poses), MOST), np.bool_)
     for first in range(0, len(poses), CHUNK):
         rows = slice(first, first + CHUNK)
-        found = _solved(arm, poses[rows])
-        for n in np.flatnonzero(found.count > MOST):
+        found, count = _solved(arm, poses[rows])
+        for n in np.flatnonzero(count > MOST):
             # the most singular solutions are dropped first
-            s = np.linalg.svd(jacobians(arm.scaled, found.q[n, : found.count[n]]))[1][:, -1]
-            found.q[n, :MOST] = found.q[n, np.sort(np.argsort(-s, kind="stable")[:MOST])]
-        valid[rows] = found.present[:, :MOST]
-        q[rows][valid[rows]] = found.q[:, :MOST][valid[rows]]
+            s = np.linalg.svd(jacobians(arm.scaled, found[n, : count[n]]))[1][:, -1]
+            found[n, :MOST] = found[n, np.sort(np.argsort(-s, kind="stable")[:MOST])]
+        valid[rows] = _present(count)[:, :MOST]
+        q[rows][valid[rows]] = found[:, :MOST][valid[rows]]
     q[:, :, arm.chain.sigma == 1] *= arm.unit
     return q, valid
 
@@ -110,16 +142,81 @@ def _(solver: EliminationArm, U: Array, references: Array, tolerances: Tolerance
     return checked(solver.chain, U, q, valid, tolerances, double=np.zeros_like(valid))
 
 
-def _solved(arm: EliminationArm, poses: Array) -> Roots:
-    """Solutions by the first form, and by others where some may be missing."""
-    found = Roots(len(poses))
+def _present(count: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Rows in use, shape (N, 48)."""
+    return np.arange(ROOM) < count[:, None]
+
+
+def _solved(arm: EliminationArm, poses: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Solutions (N, 48, 6) by the first form, and by others where some may be missing; counts."""
+    q, count = np.zeros((len(poses), ROOM, 6)), np.zeros(len(poses), np.int64)
     doubtful = np.ones(len(poses), np.bool_)
     for form in arm.forms:
         rows = np.flatnonzero(doubtful)
         if rows.size == 0:
             break
-        part = Roots(0)
-        part.q, part.count = found.q[rows], found.count[rows]
-        doubtful[rows] = solve_form(arm.scaled, arm.unit, form, poses[rows], part)[0]
-        found.q[rows], found.count[rows] = part.q, part.count
-    return found
+        found = q[rows], count[rows]
+        doubtful[rows] = _solve_form(arm, form, poses[rows], *found)[0]
+        q[rows], count[rows] = found
+    return q, count
+
+
+def _solve_form(
+    arm: EliminationArm, form: Form, poses: Array, q: Array, count: NDArray[np.int64]
+) -> tuple[NDArray[np.bool_], Array]:
+    """Add the solutions that a form finds; whether some may be missing, and its errors (N,)."""
+    from .kernels.elimination import eigenproblems
+    from .kernels.elimination_roots import solutions_of_eigenvalues
+
+    N, D = poses.shape[0], arm.scaled.D
+    # the link behind each joint; where the loop closes it holds the pose
+    last = 5 if form.direction == 1 else 0
+    links = np.empty((N, 6, 4, 4))
+    for place, j in enumerate(form.joints):
+        links[:, place] = D[j + 1] if form.direction == 1 else se3.inverse(D[j])
+        if j == last and form.direction == 1:
+            links[:, place] = D[6] @ se3.inverse(poses) @ D[0]
+        elif j == last:
+            links[:, place] = se3.inverse(D[0]) @ poses @ se3.inverse(D[6])
+    M, report, quality = np.zeros((N, 16, 16)), np.empty((N, 2)), np.empty(N)
+    parts = np.empty((N, 14, 27)), np.empty((N, 14, 8)), np.empty((N, 8), np.int64), np.empty(N)
+    loop = form.kinds, form.joints, float(form.direction), int(form.swapped)
+    eigenproblems(form.kinds, links, loop[3], M, (*parts, quality))
+    failed = ~np.all(np.isfinite(M), axis=(1, 2))
+    M[failed] = 0.0
+    eigenvalues = np.linalg.eigvals(M).astype(np.complex128)
+    eigenvalues[failed] = 1j
+    tolerance = np.array([TOLERANCE / min(arm.unit, 1.0), TOLERANCE])
+    solutions_of_eigenvalues(
+        arm.scaled.sigma, D, poses, tolerance, loop, links, eigenvalues, (*parts, quality),
+        (q, count, report),
+    )  # fmt: skip
+    missing = (count != report[:, 0]) | (quality < POOR) | failed
+    return missing | (report[:, 1] > ROUGH), report[:, 1]
+
+
+def _ranked_forms(arm: EliminationArm, poses: Array) -> tuple[Form, ...]:
+    """The best forms first, by solutions missed and by the errors before polishing.
+
+    The solutions of each at a few poses are compared with those of all together.
+    """
+    forms, counts, errors = all_forms(arm.chain.sigma), [], []
+    empty = np.zeros((len(poses), ROOM, 6)), np.zeros(len(poses), np.int64)
+    union = empty[0].copy(), empty[1].copy()
+    for form in forms:
+        alone = empty[0].copy(), empty[1].copy()
+        _, moved = _solve_form(arm, form, poses, *alone)
+        _solve_form(arm, form, poses, *union)
+        counts.append(int(alone[1].sum()))
+        # 1e-16 keeps the logarithm finite
+        errors.append(np.mean(np.log10(np.minimum(moved, 10.0) + 1e-16)))
+    most = int(union[1].sum())
+    if most == 0:
+        return ()
+    # a solution missed weighs more than any error
+    score = 100.0 * (most - np.array(counts)) + np.array(errors)
+    first = int(np.argmin(score))
+    # eigenvalues of another joint fail at other poses: worth two digits
+    score += [2.0 * (form.joints[2] == forms[first].joints[2]) for form in forms]
+    score[first] = -np.inf
+    return tuple(forms[i] for i in np.argsort(score, kind="stable")[:KEPT])

@@ -9,10 +9,10 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector
-from ..latex_text import table_latex
+from ..latex_text import Explanation, table_latex
 from ..model import RobotModel
 from .chain import TOOL, Chain, Move, motion_text, multiplied_out
-from .explanation import Document, Explanation, FormulaNumbers, frame_label
+from .explanation import Document, FormulaNumbers, frame_label
 
 
 @dataclass(frozen=True, slots=True)

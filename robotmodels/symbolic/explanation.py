@@ -10,31 +10,12 @@ from typing import Any
 import numpy as np
 
 from .._arrays import Array
-from ..latex_text import escaped, markdown, meaning_latex
+from ..latex_text import escaped, meaning_latex
 from .notation import Notation
 
 _WIDEST = 96
 """Characters of a row of a matrix; a wider one is printed entry by entry."""
 COMPONENTS = tuple(vector + axis for vector in "snaP" for axis in "xyz")
-
-
-class Explanation:
-    """Base of explanations: printing one shows the derivation; the expressions are SymPy's."""
-
-    __slots__ = ()
-    text: str
-    latex: str
-
-    def __str__(self) -> str:
-        return self.text
-
-    def _repr_markdown_(self) -> str:
-        """Form of a notebook."""
-        return markdown(self.latex)
-
-    def _repr_latex_(self) -> str:
-        """Form of a notebook that is converted to LaTeX."""
-        return self.latex
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,9 +13,10 @@ from .. import se3
 from .._arrays import as_vector
 from ..errors import InvalidValueError
 from ..kinematics.factors import JacobianFactors, middle_frames
+from ..latex_text import Explanation
 from ..model import FrameOfInterest, RobotModel, check_model
 from .chain import TOOL, WORLD
-from .explanation import Document, Explanation, FormulaNumbers, aligned, equation, frame_label
+from .explanation import Document, FormulaNumbers, aligned, equation, frame_label
 from .factor import numbers_of
 from .formula import formulas
 from .minors import ROWS, filled_entries

@@ -13,7 +13,8 @@ from .._arrays import Array, as_vector
 from .._choices import chosen
 from ..errors import InvalidValueError
 from ..kinematics import SingularityKind
-from .explanation import Explanation, FormulaNumbers
+from ..latex_text import Explanation
+from .explanation import FormulaNumbers
 from .factor import SingularityFactor
 
 

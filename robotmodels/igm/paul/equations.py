@@ -17,7 +17,6 @@ from .products import Fixed, Item, Motion, Rotation, product, turned
 from .unknowns import Joints
 
 SAMPLES = 7
-POSE_NAMES = (("s", "n", "a", "P"), ("x", "y", "z"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,14 +70,10 @@ class Arm:
         self.joints = Joints(form, graph, [K.R for K in self.K], postures)
         U = self.frames(postures)[:, -1]
         U = U if self.E is None else U @ _number(self.E, graph)
-        R = [[self._element(i, j, U) for j in range(3)] for i in range(3)]
-        self.U0 = Fixed(R, [self._element(i, 3, U) for i in range(3)], False)
+        U0 = [[graph.symbol(Kind.POSE, c + a, f"{c}_{{{a}}}", U[:, i, j])
+               for j, c in enumerate("snaP")] for i, a in enumerate("xyz")]  # fmt: skip
+        self.U0 = Fixed([row[:3] for row in U0], [row[3] for row in U0], False)
         self.U0_inverse = self.U0.inverse(graph)
-
-    def _element(self, i: int, j: int, U: Array) -> Expression:
-        column, axis = POSE_NAMES[0][j], POSE_NAMES[1][i]
-        latex = f"{column}_{{{axis}}}"
-        return self.graph.symbol(Kind.POSE, column + axis, latex, U[:, i, j])
 
     def _constant(self, name: str, latex: str, value: float, meaning: str) -> Expression:
         if value == 0.0:
@@ -119,21 +114,18 @@ class Arm:
         tool = self.form.tool
         if np.abs(tool - np.eye(4)).max() < 1e-13:
             return None
-        R = [[self._turn_element(i, j, float(tool[i, j])) for j in range(3)] for i in range(3)]
-        p = [
-            self._constant(f"{a.upper()}E", f"{a.upper()}_{{E}}", float(tool[i, 3]),
-                           f"{a} of the tool")
-            if abs(tool[i, 3]) > 1e-12 else ZERO
-            for i, a in enumerate("xyz")
-        ]  # fmt: skip
-        return Fixed(R, p)
 
-    def _turn_element(self, i: int, j: int, value: float) -> Expression:
-        if abs(value - round(value)) < 1e-12:
-            return float(round(value)), 0
-        column, axis = POSE_NAMES[0][j], POSE_NAMES[1][i]
-        meaning = f"{column}{axis} of the tool"
-        return self._constant(f"{column}{axis}E", f"{column}_{{{axis}E}}", value, meaning)
+        def element(value: float, name: str, latex: str, meaning: str, known: float) -> Expression:
+            if abs(value - known) < 1e-12:
+                return known, 0
+            return self._constant(name, latex, value, f"{meaning} of the tool")
+
+        R = [[element(x, f"{c}{a}E", f"{c}_{{{a}E}}", c + a, float(round(x)))
+              for c, x in zip("sna", row, strict=True)]
+             for a, row in zip("xyz", tool[:3, :3].tolist(), strict=True)]  # fmt: skip
+        p = [element(x, f"{a}E", f"{a}_{{E}}", a.lower(), 0.0)
+             for a, x in zip("XYZ", tool[:3, 3].tolist(), strict=True)]  # fmt: skip
+        return Fixed(R, p)
 
     def frames(self, q: Array) -> Array:
         """Poses of the frames of the rows at postures. Shapes: q (N, k) -> (N, k, 4, 4)."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...geometry import constant_names
-from ...latex_text import escaped, markdown, meaning_latex, powers, table_latex
+from ...latex_text import Explanation, escaped, meaning_latex, powers, table_latex
 from ...model import RobotModel, check_model
 from ...table_text import SMALLEST, angle_text
 from ..arm_angle import prepare_arm_angle
@@ -26,7 +26,7 @@ _ARCS = (EquationType.TYPE_2_ZERO, EquationType.TYPE_3, EquationType.TYPE_3_DIRE
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class InverseModelExplanation:
+class InverseModelExplanation(Explanation):
     """How the inverse geometric model of a robot is derived, made by `explain_igm`.
 
     Parameters
@@ -63,20 +63,9 @@ class InverseModelExplanation:
     text: str
     latex: str
 
-    def __str__(self) -> str:
-        return self.text
-
     def __repr__(self) -> str:
         found = "all joints" if self.complete else f"all but {', '.join(self.remaining)}"
         return f"<InverseModelExplanation of {self.robot}: {found} by Paul's method>"
-
-    def _repr_markdown_(self) -> str:
-        """What a notebook shows."""
-        return markdown(self.latex)
-
-    def _repr_latex_(self) -> str:
-        """What a notebook that becomes a LaTeX document shows."""
-        return self.latex
 
 
 def explain_igm(model: RobotModel) -> InverseModelExplanation:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._arrays import Array
+from ...se3 import inverse
 from ..loop import JointChain
 from ..structure import ANGLE_TOLERANCE, LENGTH_TOLERANCE
 
@@ -82,7 +83,7 @@ def normal_form(chain: JointChain, frames: Sequence[int]) -> NormalForm:
             lengths[j - 1] += b
     exact = np.empty((k, 4, 4))
     for j, (gamma, b, _, _, theta, r) in enumerate(parts):
-        crossing = _inverse(_screw(gamma, b)) @ chain.D[j] @ _inverse(_screw(theta, r))
+        crossing = inverse(_screw(gamma, b)) @ chain.D[j] @ inverse(_screw(theta, r))
         exact[j] = crossing @ _screw(turns[j], lengths[j])
     start, tool = _screw(*parts[0][:2]), chain.D[k]
     whole = k >= 6
@@ -90,7 +91,7 @@ def normal_form(chain: JointChain, frames: Sequence[int]) -> NormalForm:
         # the first constant goes to the pose, and what the last joint carries along its axis
         start = start @ exact[0]
         tool = _screw(turns[-1], lengths[-1]) @ tool
-        exact[-1] = exact[-1] @ _inverse(_screw(turns[-1], lengths[-1]))
+        exact[-1] = exact[-1] @ inverse(_screw(turns[-1], lengths[-1]))
         exact[0] = np.eye(4)
         parts[0] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         turns[0] = lengths[0] = turns[-1] = lengths[-1] = 0.0
@@ -103,8 +104,8 @@ def normal_form(chain: JointChain, frames: Sequence[int]) -> NormalForm:
     )  # fmt: skip
     return NormalForm(
         rows=rows,
-        before=_inverse(start),
-        after=_inverse(tool) if whole else np.eye(4),
+        before=inverse(start),
+        after=inverse(tool) if whole else np.eye(4),
         tool=np.eye(4) if whole else tool,
         lever=tool[:3, 3].copy() if whole else np.zeros(3),
         exact=exact,
@@ -128,7 +129,7 @@ def _common_normal(D: Array) -> tuple[float, float, float, float, float, float]:
         gamma -= pi
     elif gamma <= -pi / 2 + 1e-12:
         gamma += pi
-    rest = _inverse(_screw(gamma, 0.0)) @ D
+    rest = inverse(_screw(gamma, 0.0)) @ D
     z, p = rest[:3, 2], rest[:3, 3]
     alpha = atan2(-z[1], z[2])
     if across > ANGLE_TOLERANCE:
@@ -140,26 +141,16 @@ def _common_normal(D: Array) -> tuple[float, float, float, float, float, float]:
         b, r = 0.0, p[2] * cos(alpha)
     if abs(alpha + pi) < ANGLE_TOLERANCE:
         alpha = pi
-    back = _inverse(
-        np.array([[1, 0, 0], [0, cos(alpha), -sin(alpha)], [0, sin(alpha), cos(alpha)]])
-    )
-    turned = back @ rest[:3, :3]
-    return gamma, float(b), alpha, float(p[0]), atan2(turned[1, 0], turned[0, 0]), float(r)
+    # the x axis behind Rot(x, alpha)
+    x = rest[:3, 0]
+    theta = atan2(cos(alpha) * x[1] + sin(alpha) * x[2], x[0])
+    return gamma, float(b), alpha, float(p[0]), theta, float(r)
 
 
 def _screw(angle: float, length: float) -> Array:
     """``Rot(z, angle) Trans(z, length)``."""
     c, s = cos(angle), sin(angle)
     return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, length], [0, 0, 0, 1.0]])
-
-
-def _inverse(T: Array) -> Array:
-    if T.shape == (3, 3):
-        return T.T
-    out = np.eye(4)
-    out[:3, :3] = T[:3, :3].T
-    out[:3, 3] = -T[:3, :3].T @ T[:3, 3]
-    return out
 
 
 def _no_dust(length: float) -> float:
