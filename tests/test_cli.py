@@ -57,6 +57,20 @@ def save(path, names, *columns):
     np.savetxt(path, np.column_stack(columns), delimiter=",", header=",".join(names), comments="")
 
 
+def motion(seed, samples, dt):
+    """A planar arm with bodies and friction, a motion of it, and its torques with noise."""
+    rng, arm = np.random.default_rng(seed), rm.load("planar_2r")
+    arm = arm.with_inertia(uniform_bodies(arm, 6.0)).with_drive(
+        rm.DriveParameters(*(np.full(2, x) for x in (0.4, 3.0, 2.0, 0.5)))
+    )
+    t, q = dt * np.arange(samples)[:, None], 0.0
+    for k in (1, 2, 3):
+        w, phase = 2.0 * np.pi * k * (0.15 + 0.05 * np.arange(2)), rng.uniform(0.0, 6.0, 2)
+        wave = [np.sin(w * t + phase), w * np.cos(w * t + phase), -(w**2) * np.sin(w * t + phase)]
+        q = q + 0.4 / k * np.array(wave)
+    return arm, q[0], rm.idm(arm, *q) + 0.05 * rng.normal(size=q[0].shape)
+
+
 @pytest.mark.parametrize(
     "words",
     [
@@ -275,17 +289,7 @@ def files(tmp_path_factory):
         found = rm.igm(tool, np.array(turns))
         save(folder / f"{name}.csv", joints, found.q[found.valid][::3])
     # a log of two joints in degrees, torques in a file of their own, velocities of another scale
-    real = rm.load("planar_2r")
-    real = real.with_inertia(uniform_bodies(real, 6.0)).with_drive(
-        rm.DriveParameters(*(np.full(2, x) for x in (0.4, 3.0, 2.0, 0.5)))
-    )
-    t = np.arange(0.0, 16.0, dt)[:, None]
-    q = v = a = 0.0
-    for k in (1, 2, 3):
-        w, phase = 2.0 * np.pi * k * (0.15 + 0.05 * np.arange(2)), rng.uniform(0.0, 6.0, 2)
-        q = q + 0.4 / k * np.sin(w * t + phase)
-        v, a = v + 0.4 / k * w * np.cos(w * t + phase), a - 0.4 / k * w**2 * np.sin(w * t + phase)
-    tau = rm.idm(real, q, v, a) + 0.05 * rng.normal(size=q.shape)
+    real, q, tau = motion(0, 8000, dt)
     save(folder / "q.csv", ["q1", "q2"], np.degrees(q))
     save(folder / "tau.csv", ["tau1", "tau2"], tau)
     save(folder / "late.csv", ["tau1", "tau2"], np.roll(tau, 100, axis=0))

@@ -12,7 +12,7 @@ import webbrowser
 import numpy as np
 import pytest
 import umsgpack
-from test_cli import save
+from test_cli import motion, save
 
 import robotmodels as rm
 from robotmodels import se3
@@ -29,32 +29,16 @@ def examples(command):
     return [shlex.split(line) for line in re.findall(r"^  robotmodels (.*)$", text, re.MULTILINE)]
 
 
-def motion(seed, samples=1600, dt=0.005):
-    """A motion of the planar arm with bodies and friction, and its torques with noise."""
-    rng = np.random.default_rng(seed)
-    arm = rm.load("planar_2r")
-    arm = arm.with_inertia(uniform_bodies(arm, 6.0)).with_drive(
-        rm.DriveParameters(*(np.full(2, x) for x in (0.4, 3.0, 2.0, 0.5)))
-    )
-    t = dt * np.arange(samples)[:, None]
-    q = v = a = 0.0
-    for k in (1, 2, 3):
-        w, phase = 2.0 * np.pi * k * (0.15 + 0.05 * np.arange(2)), rng.uniform(0.0, 6.0, 2)
-        q = q + 0.4 / k * np.sin(w * t + phase)
-        v, a = v + 0.4 / k * w * np.cos(w * t + phase), a - 0.4 / k * w**2 * np.sin(w * t + phase)
-    return q, rm.idm(arm, q, v, a) + 0.05 * rng.normal(size=q.shape)
-
-
 def identify_files(folder):
     arm = rm.load("planar_2r")
     rm.write_urdf(arm, folder / "arm.urdf")
     rm.write_urdf(arm.with_inertia(uniform_bodies(arm, 9.0)), folder / "heavy.urdf")
-    q, tau = motion(0)
+    _, q, tau = motion(0, 1600, 0.005)
     save(folder / "positions.csv", ["q1", "q2"], np.degrees(q))
     save(folder / "torques.csv", ["tau1", "tau2"], tau)
     np.savez(folder / "run.npz", q=q, tau=tau, t=0.005 * np.arange(len(q)))
     for k in (1, 2, 3):
-        q, tau = motion(k)
+        _, q, tau = motion(k, 1600, 0.005)
         names = ["actual_q_0", "actual_q_1", "current_0", "current_1"]
         save(folder / f"run{k}.csv", names, q, tau / [13.3, 9.4])
 
