@@ -77,23 +77,11 @@ def standard_parameters(
 
     Parameters
     ----------
-    base, prior, drive_prior, margin
-        See the head of this page.
     values : array_like, shape (b,)
         Base parameters, such as identified ones.
     weights : array_like, shape (k, b), optional
         The norm of nearest base parameters is ``|weights @ (b - values)|``; the triangular
         factor of the regressor for the nearest torques. Default relative to the values.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters import base_parameters, uniform_bodies
-    >>> arm = load("lab_rr")
-    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
-    >>> base = base_parameters(arm)
-    >>> standard_parameters(base, base.values(arm)).status.name
-    'EXACT'
     """
     b = as_exact(values, (len(base),), "values")
     if weights is None:  # relative to the values, at least a thousandth of the largest of a kind
@@ -130,8 +118,6 @@ def fit_consistent(
 
     Parameters
     ----------
-    base, prior, drive_prior, margin
-        See the head of this page.
     R, y : array_like, shapes (r, b), (r,)
         Triangular factor of the weighted regressor, and the right side of the same system.
     rest, rows : float, int, optional

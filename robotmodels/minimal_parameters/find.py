@@ -60,9 +60,8 @@ def base_parameters(
     tolerance : float, optional
         Zero tolerance, at most 0.01: the largest relative torque of a parameter that is not kept,
         the angle in rad up to which axes are taken as aligned, and a coefficient in natural units.
-        By default axes within 1e-5 rad are taken as parallel or perpendicular (a file may write
-        1.5708), and the torques of that robot are kept to 1e-11; ``1e-11`` uses every digit of the
-        table. On logged motion the limit moves to the widest gap within a factor of 30.
+        Default 1e-5 rad for axes (a file may write 1.5708) and 1e-11 for torques; ``1e-11`` uses
+        every digit. On logged motion the limit moves to the widest gap within a factor of 30.
 
     Returns
     -------
@@ -73,9 +72,8 @@ def base_parameters(
     Raises
     ------
     InvalidValueError, ShapeError
-        Another method; motion or a constraint for the symbolic one; an empty log; friction that is
-        not linear or repeats columns of the drives; a tolerance above 0.01; arrays of the wrong
-        shape.
+        Motion or a constraint for the symbolic method; an empty log; friction that is not linear or
+        repeats columns of the drives; a tolerance above 0.01; arrays of the wrong shape.
 
     References
     ----------
