@@ -19,37 +19,29 @@ _ROUNDING = 1e-300  # viscous torque at this velocity
 class Friction(Protocol):
     """A friction model for `idm` and `ddm`; a user's model needs only these members.
 
-    A model whose torque depends on positions too has ``needs_position = True`` beside, and takes
-    them as a second argument: ``torque(v, q)``, ``basis(v, q)``.
+    ``n`` joints, and ``torque(v)``, the torque (..., n) that they need to overcome friction at
+    velocities (..., n). A model whose torque depends on positions too has ``needs_position = True``
+    beside, and takes them as a second argument: ``torque(v, q)``, ``basis(v, q)``.
     """
 
     @property
-    def n(self) -> int:
-        """Number of joints."""
-        ...
-
-    def torque(self, v: ArrayLike) -> Array:
-        """Torque that the joints need to overcome friction at velocities ``(..., n)``."""
-        ...
+    def n(self) -> int: ...  # noqa: D102
+    def torque(self, v: ArrayLike) -> Array: ...  # noqa: D102
 
 
 @runtime_checkable
 class LinearFriction(Friction, Protocol):
-    """A friction model that is linear in its parameters, for regressors."""
+    """A friction model that is linear in its parameters, for regressors.
+
+    ``kinds`` names the k parameters of a joint, ``parameters`` (k, n) are their values, and
+    ``basis(v)`` is the torque per unit of each, (..., k, n).
+    """
 
     @property
-    def kinds(self) -> tuple[str, ...]:
-        """Names of a joint's k parameters."""
-        ...
-
+    def kinds(self) -> tuple[str, ...]: ...  # noqa: D102
     @property
-    def parameters(self) -> Array:
-        """Values, shape (k, n)."""
-        ...
-
-    def basis(self, v: ArrayLike) -> Array:
-        """Torque per unit of each parameter of its joint, shape (..., k, n)."""
-        ...
+    def parameters(self) -> Array: ...  # noqa: D102
+    def basis(self, v: ArrayLike) -> Array: ...  # noqa: D102
 
 
 class Summable:
