@@ -10,7 +10,7 @@ from identities.random_robots import random_model, random_state
 import robotmodels as rm
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
 from robotmodels.identification import exciting_trajectory, write_trajectory
-from robotmodels.identification.excitation.limits import (
+from robotmodels.identification.excitation.exciting import (
     excitation_limits,
     excitation_torques,
     origin_distances,

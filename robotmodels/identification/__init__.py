@@ -24,8 +24,7 @@ from .excitation import ExcitingTrajectory, exciting_trajectory, write_trajector
 from .fit import fit
 from .friction import fit_friction
 from .loads import KnownPayload, LoadedLog
-from .methods.linear import Irls, Ols, Ridge, Total, Wls
-from .methods.robust import Robust
+from .methods.linear import Irls, Ols, Ridge, Robust, Total, Wls
 from .methods.sequential import Recursive, Sequential
 from .payload import identify_payload
 from .processing import choose_processing

@@ -87,10 +87,15 @@ def looped_equations(
     if test is not None:
         test, more = accepted_test(given, test, len(robot.actuated), None, checked)
         findings += more
+    if log.n != len(robot.actuated):
+        raise InvalidValueError(
+            f"log: it has {log.n} joints, and {len(robot.actuated)} of {robot.name!r} are "
+            "actuated; give read_log the columns of these joints."
+        )
     if base is None:
-        first = close(robot, log.q[0]) if log.n == len(robot.actuated) else None
-        found = first is not None and first.status == ClosingStatus.CLOSED
-        base = base_parameters(robot, first.q if first and found else None, drive)
+        first = close(robot, log.q[0])
+        found = first.status == ClosingStatus.CLOSED
+        base = base_parameters(robot, first.q if found else None, drive)
     if not isinstance(base, LoopedParameters) or base.robot != robot:
         raise InvalidValueError(
             "base: expected loops.base_parameters(robot, q_ref) of the same looped robot."
@@ -106,11 +111,6 @@ def looped_equations(
 def with_all_joints(base: LoopedParameters, log: Log) -> Log:
     """The log with positions of all joints, and no torque of the passive ones."""
     robot = base.robot
-    if log.n != len(robot.actuated):
-        raise InvalidValueError(
-            f"log: it has {log.n} joints, and {len(robot.actuated)} of {robot.name!r} are "
-            "actuated; give read_log the columns of these joints."
-        )
     q, v, a, _ = base.motion(base.q_ref, log.q, log.v, log.a)
     tau = np.zeros(q.shape)
     tau[:, robot.actuated] = log.tau

@@ -10,8 +10,7 @@ from typing import Any
 from ..errors import InvalidValueError
 from .closed_loop import Didim, Instrumental, OutputError
 from .methods.base import Method
-from .methods.linear import Irls, Ols, Ridge, Total, Wls
-from .methods.robust import Robust
+from .methods.linear import Irls, Ols, Ridge, Robust, Total, Wls
 from .methods.sequential import Recursive, Sequential
 
 _OBJECTS = ("prior", "controller")  # options that are objects and have no text form

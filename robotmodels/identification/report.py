@@ -89,7 +89,7 @@ def _verdict(
     result: IdentificationResult, diagnostics: ResidualDiagnostics, warning: str
 ) -> ReportSection:
     """Outcome, quality of the predictions, and parameters that are not determined."""
-    estimate, details, names = result.estimate, result.details, result.names
+    estimate, names = result.estimate, result.names
     iterations = f", {estimate.iterations} iterations." if estimate.iterations > 1 else "."
     title, k = result.method.title, int(np.argmax(result.relative_errors))
     weak, scaled = weak_parameters(estimate), result.scaled_condition
@@ -101,10 +101,6 @@ def _verdict(
         f"Largest relative standard error: {percent_text(result.relative_errors[k])} ({names[k]}). "
         f"Poorly determined (above {100.0 * WEAK:.0f} %): {', '.join(weak) or 'none'}.",
     ]
-    if details.unidentifiable:
-        sentences.append(f"The log does not determine: {', '.join(details.unidentifiable)}.")
-    if details.dropped:
-        sentences.append(f"Left out as not essential: {', '.join(details.dropped)}.")
     sentences.append(
         f"The condition number of the regressor is {result.condition:.3g}, and {scaled:.3g} with "
         "columns of length one"
