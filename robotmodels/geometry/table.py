@@ -64,12 +64,6 @@ class DHTable:
         limits the wrong way round, repeated names.
     ShapeError, InvalidValueError
         Columns of different lengths; NaN anywhere, infinity in a geometric column.
-
-    Examples
-    --------
-    >>> arm = DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3])
-    >>> arm.n, arm.names
-    (2, ('joint_1', 'joint_2'))
     """
 
     antecedent: NDArray[np.int64]

@@ -154,12 +154,6 @@ class RobotModel:
         ShapeError, InvalidValueError, NotARotationError, FrameNotFoundError
             Parts that do not fit each other; a base or tool that is not a pose; a tip that is
             not a frame.
-
-        Examples
-        --------
-        >>> table = DHTable.from_rows([{"sigma": 0}, {"sigma": 0, "d": 0.3}])
-        >>> RobotModel.from_table(table, tool=se3.translation(0.2, 0, 0), name="planar").n
-        2
         """
         check_table(table)
         return cls(

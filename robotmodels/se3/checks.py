@@ -40,11 +40,6 @@ def as_pose(T: Any, name: str = "T") -> Array:
     Anything with a ``homogeneous`` attribute (``pinocchio.SE3``) is accepted. A rotation that
     is off by more than rounding, but less than `ROTATION_TOLERANCE`, is replaced by the nearest
     rotation (polar decomposition); rotations exact to rounding are left untouched.
-
-    Examples
-    --------
-    >>> as_pose([[1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]).shape
-    (4, 4)
     """
     try:
         T = as_core(getattr(T, "homogeneous", T), (4, 4), name)

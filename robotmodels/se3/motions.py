@@ -30,13 +30,7 @@ from .._arrays import Array
 
 
 def rotation(axis: str, angle: float) -> Array:
-    """Pose of a rotation about one coordinate axis, ``Rot(axis, angle)``.
-
-    Examples
-    --------
-    >>> rotation("z", np.pi)[0, 0]
-    np.float64(-1.0)
-    """
+    """Pose of a rotation about one coordinate axis, ``Rot(axis, angle)``."""
     c, s = _cos_sin(angle)
     i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
     T = np.eye(4)
