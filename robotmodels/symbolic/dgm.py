@@ -41,12 +41,10 @@ class DirectModelExplanation(Explanation):
     Parameters
     ----------
     variables : tuple of sympy.Symbol, length n
-        Joint variables in table order: ``theta_j`` if revolute, ``r_j`` if prismatic, numbered
-        by frame.
-    factors : tuple of SymbolicTransform
-        ``T(a(j), j)`` of each row from the base to the frame.
-    products : tuple of SymbolicTransform
-        Products of the last two, three, ... factors; the last one is the product of all of them.
+        Joint variables in table order, numbered by frame: ``theta_j`` or ``r_j``.
+    factors, products : tuple of SymbolicTransform
+        ``T(a(j), j)`` of each row from the base to the frame, and the products of the last two,
+        three, ... of them; the last one is the product of all.
     product : SymbolicTransform
         ``0Tn``, the pose of the last frame of the chain in R_0.
     base, tool : SymbolicTransform or None
@@ -54,10 +52,9 @@ class DirectModelExplanation(Explanation):
     pose : sympy.ImmutableDenseMatrix, shape (4, 4)
         The world pose, ``Z 0Tn E``; its columns are ``s``, ``n``, ``a``, ``P``.
     abbreviations : tuple of (sympy.Symbol, sympy.Expr)
-        ``C23`` and its meaning ``cos(theta2 + theta3)``, and so on; each uses only symbols that
-        come before it.
+        ``C23`` and its meaning ``cos(theta2 + theta3)``, and so on, each after those it uses.
     constants : tuple of (sympy.Symbol, float)
-        The values of lengths (metres) and angles (radians) of this robot.
+        Lengths (metres) and angles (radians) of this robot.
     """
 
     robot: str
@@ -125,15 +122,14 @@ def explain_dgm(
     components s, n, a, P of ``0Tn``, and with the base and the tool where there are any. Angles
     about parallel axes are added, also where translations stand between them.
 
-    Notation: ``C1``, ``S1`` are cosine and sine of ``θ1``, ``C23`` of ``θ2 + θ3``; an ``m`` before
-    a number subtracts, so ``C2m3 = cos(θ2 - θ3)`` for opposite axes. With ten frames or more,
-    sums have underscores: ``C2_3``. Constants that are not zero get symbols: ``Dj``, ``RLj`` and
-    ``BLj`` for d, r and b of row j, and for angles that are no multiple of 30 or 45 degrees ``Aj``,
-    ``Bj``, ``Gj`` and ``THj`` for alpha, beta, gamma and the constant part of theta
-    (``C2TH2 = cos(θ2 + TH2)``); ``C1p45 = cos(θ1 + 45°)``. Names in ``DHTable.symbols``, such as
-    those of a ``.par`` file, replace these. The base is ``Z = Trans(X0, Y0, Z0)
-    Rot(z, AZ0) Rot(y, AY0) Rot(x, AX0)``, the tool the same with E instead of 0. Partial results
-    of more than 100 symbols (arms with many oblique axes) are named ``U1``, ``U2``, ...
+    Notation: ``C1``, ``S1`` are cosine and sine of ``θ1``, ``C23`` of ``θ2 + θ3``, ``C2m3`` of
+    ``θ2 - θ3`` (opposite axes), ``C1p45`` of ``θ1 + 45°``; with ten frames or more ``C2_3``.
+    Constants that are not zero get symbols: ``Dj``, ``RLj`` and ``BLj`` for d, r and b of row j,
+    and ``Aj``, ``Bj``, ``Gj`` and ``THj`` for alpha, beta, gamma and the constant part of theta
+    where they are no multiple of 30 or 45 degrees. Names in ``DHTable.symbols``, such as those of a
+    ``.par`` file, replace these. The base is ``Z = Trans(X0, Y0, Z0) Rot(z, AZ0) Rot(y, AY0)
+    Rot(x, AX0)``, the tool the same with E instead of 0. Partial results of more than 100 symbols
+    (arms with many oblique axes) are named ``U1``, ``U2``, ...
 
     Book eq. [1.3], [1.4], [1.10] and example 1.2; the exercise, eq. (4.5).
 

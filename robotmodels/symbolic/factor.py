@@ -157,16 +157,10 @@ def long_factor(M: tuple[tuple[Poly, ...], ...], chain: PolynomialChain) -> Sing
     entries = sympy.ImmutableDenseMatrix([[formula(p, chain) for p in row] for row in M])
     joints = {j for row in M for p in row for j in chain.joints_of(p)}
     text = f"the determinant of a {len(M)} by {len(M)} block"
-    return SingularityFactor(
-        kind=SingularityKind.OTHER,
-        text=text,
-        latex=rf"\text{{{text}}}",
-        expression=None,
-        joints=tuple(sorted(chain.joints[j] for j in joints)),
-        unit="",
-        numbers=numbers_of(chain, [entries]),
-        matrix=entries,
-    )
+    columns = tuple(sorted(chain.joints[j] for j in joints))
+    numbers, latex = numbers_of(chain, [entries]), rf"\text{{{text}}}"
+    kind = SingularityKind.OTHER
+    return SingularityFactor(kind, text, latex, None, columns, "", numbers, matrix=entries)
 
 
 def with_meaning(

@@ -40,19 +40,17 @@ def explain_singularities(
 ) -> SingularityExplanation:
     """Where a robot is singular, as formulas: the factors of the determinant of its Jacobian.
 
-    Only the third of the three matrices of the book can be singular. The projection and
-    intermediate frames are chosen so that it has the most zeros; rows and columns are rearranged
-    to a block triangular form, so that the determinant is the product of small ones, and these
-    are factored as polynomials in sines and cosines. For an arm with a spherical wrist that gives
-    the determinant of the arm times that of the wrist.
+    Only the third of the three matrices of the book can be singular. Its projection and
+    intermediate frames are those with the most zeros; rows and columns are rearranged to a block
+    triangular form, so that the determinant is the product of small ones (for a spherical wrist
+    those of arm and wrist), and these are factored as polynomials in sines and cosines.
 
-    What decides: for six joints the determinant of the Jacobian (base and tool do not matter).
-    For up to three joints the position of the frame, if it has as many freedoms as they are (here
-    the tool matters; `classify_singularity`, `nearest_singularity` and `singularity_flags` take it
-    by default as well); else the rows that are not zero, if they are as many as the joints (four
-    of a SCARA arm); else all square minors. For more joints than rows all square minors: the
-    matrix loses rank where every minor has a factor that vanishes, and ``conditions`` are the
-    smallest sets of such factors.
+    What decides: for six joints the determinant of the Jacobian. For up to three joints the
+    position of the frame, if it has as many freedoms as they are (as by default in
+    `classify_singularity`, `nearest_singularity` and `singularity_flags`); else the rows that are
+    not zero, if they are as many as the joints (four of a SCARA arm); else all square minors. For
+    more joints than rows the matrix loses rank where every minor has a factor that vanishes, and
+    ``conditions`` are the smallest sets of such factors.
 
     Book section 1.3.1.3.
 

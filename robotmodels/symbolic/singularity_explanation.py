@@ -93,10 +93,8 @@ class SingularityExplanation(Explanation):
         Of the determinant.
     projection, intermediate : str
         Names of the frames i and j of the third matrix; empty where each minor has its own.
-    matrix : sympy.ImmutableDenseMatrix, shape (rows, columns), or None
-        The rows that count of the third matrix.
-    rows : tuple of int
-        Which those are, 0 to 5 for ``[v; w]``; empty where each minor has its own.
+    matrix, rows : sympy.ImmutableDenseMatrix or None, and tuple of int
+        The rows that count of the third matrix, and which of ``[v; w]`` (0 to 5) they are.
     """
 
     robot: str
@@ -125,10 +123,9 @@ class SingularityExplanation(Explanation):
     def determinant(self, q: ArrayLike) -> Array:
         """Determinant (...) of the square matrix that decides, at q (..., n), from the formulas.
 
-        For six joints it is the determinant of the Jacobian, sign included, for any frames, as the
-        first two of the three matrices have the determinant 1. For fewer it is that of the rows
-        that ``task`` names, in the axes of R_i. It is zero where the matrix has never full rank,
-        and an error if the matrix is not square.
+        For six joints that of the Jacobian, sign included; for fewer that of the rows that ``task``
+        names, in the axes of R_i; zero where the matrix has never full rank. An error if the
+        matrix is not square.
         """
         q = as_vector(q, len(self.numbers.variables), "q")
         if np.isnan(self.constant):

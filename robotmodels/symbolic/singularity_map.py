@@ -28,10 +28,8 @@ class SingularityMap(Frozen, Value):
     ----------
     model_name : str
         Name of the robot.
-    joints : ndarray of int, shape (2,)
-        Columns of q, from 0, of the two joints.
-    names : tuple of str, length 2
-        Names of the two joints.
+    joints, names : ndarray of int, shape (2,), and tuple of str
+        Columns of q, from 0, and names of the two joints.
     first, second : ndarray, shapes (na,), (nb,)
         Their values, rad or m, ascending.
     values : ndarray, shape (na, nb)
@@ -39,8 +37,7 @@ class SingularityMap(Frozen, Value):
     label : str
         The quantity, such as ``"elbow: C3"``.
     units : tuple of str, length 3
-        Units of ``first``, ``second`` and ``values``, such as ``("rad", "rad", "m^2")``; ``"1"``
-        where there is none.
+        Of ``first``, ``second`` and ``values``: ``"rad"``, ``"m^2"``, ``"1"`` where there is none.
     """
 
     model_name: str
@@ -117,16 +114,10 @@ def singularity_map(
     rows = model.table.joint_rows[columns]
     own = ["m" if model.table.sigma[row] == PRISMATIC else "rad" for row in rows]
     names = [str(model.table.names[row]) for row in rows]
-    return SingularityMap(
-        model_name=model.name,
-        joints=np.array(columns),
-        names=(names[0], names[1]),
-        first=axes[0],
-        second=axes[1],
-        values=values,
-        label=label,
-        units=(own[0], own[1], unit),
-    )
+    first, second = axes
+    units = own[0], own[1], unit
+    pair = names[0], names[1]
+    return SingularityMap(model.name, np.array(columns), pair, first, second, values, label, units)
 
 
 def _limits(model: RobotModel, columns: list[int]) -> Array:
