@@ -184,11 +184,13 @@ def test_flags():
     q = random_state(arm, np.random.default_rng(0), 2, 2)[0]
     q[..., 4] = [[0.0, 1e-4], [0.5, 1.0]]
     found = singularity_flags(arm, q)
-    np.testing.assert_array_equal(found.status, [[2, 1], [0, 0]])
     np.testing.assert_array_equal(found.rank, [[5, 6], [6, 6]])
     np.testing.assert_array_equal(found.order, [[1, 0], [0, 0]])
     sigma = jacobian_rank(arm, q).singular_values
-    np.testing.assert_allclose(found.weakest, sigma[..., 5] / sigma[..., 0], atol=1e-15)
+    ratio = sigma[..., 5] / sigma[..., 0]
+    np.testing.assert_allclose(found.weakest, ratio, atol=1e-15)
+    np.testing.assert_array_equal(found.status, np.where(found.rank < 6, 2, ratio < 1e-2))
+    assert {*found.status.flat} == {0, 1, 2}
     assert found.reason((0, 1)) == SingularityStatus.NEAR_SINGULAR.sentence
 
 
