@@ -90,6 +90,7 @@ def selected(kind, count, **options):
         # an angle is no length, and a length of 0 shrinks to itself
         ("contain no length", lambda: identifiable_parameters(
             RX90, FrameContact, known_lengths=["theta2", "d5"])),
+        ("the 0 parameters", lambda: selected("orientation", 6, candidates=Q, parameters=["d3"])),
         ("at least 5", lambda: selected("pose", 4, candidates=Q)),
         ("expected at most 30.*got 40", lambda: selected("pose", 40, candidates=Q)),
         ("^candidates", lambda: selected("pose", 10, candidates=Q[:, :5])),

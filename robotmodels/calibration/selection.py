@@ -319,10 +319,11 @@ def group_rows(
         else:
             scale = as_sigma(sigma, 1, len(units))[0]
         (rows,) = linearised(problem, xi, guessed_fixtures(problem, xi))
-        A = whitened(measurement, rows.by_parameters, scale).reshape(G, -1, len(parameters))
+        count = part.shape[1] * len(units)
+        A = whitened(measurement, rows.by_parameters, scale).reshape(G, count, len(parameters))
         if problem.F:
             F = whitened(measurement, rows.by_fixtures, scale)
-            F = F.reshape(G, A.shape[1], G, -1)[np.arange(G), :, np.arange(G)]
+            F = F.reshape(G, count, G, -1)[np.arange(G), :, np.arange(G)]
             Q = np.linalg.qr(F, mode="complete")[0]
             A = Q[:, :, F.shape[-1] :].swapaxes(-1, -2) @ A
         parts.append(A)

@@ -72,14 +72,12 @@ def measurement_of(
     parameters: GeometricParameters,
     kind: Kind | str,
     groups: Groups,
-    *,
     frame: Frame = None,
     corrections: Array | None = None,
-    sigma: Array | float | None = None,
 ) -> Measurement:
     """Noise-free measurement of a robot at given configurations."""
     T = differential_model(parameters, groups.q, corrections, frame).T
-    return as_kind(kind).drawn(groups.q, T, groups.label, sigma=sigma, frame=frame)
+    return as_kind(kind).drawn(groups.q, T, groups.label, frame=frame)
 
 
 def drawn_groups(
