@@ -8,6 +8,7 @@ joint limits, for the position alone, and for the orientation at that position g
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import pi
 from typing import NamedTuple
 
@@ -134,13 +135,18 @@ def pose_search(
 
     ``effort``: tolerances, starts, and iterations from each.
     """
-    k = space.chain.k
-    wanted = Constraints(space.chain, components, np.zeros((0, k)), np.zeros(0), space.length)
-    chunks = [slice(n, n + CHUNK) for n in range(0, max(len(U), 1), CHUNK)]
-    parts = [
-        _Search(space, wanted, *effort, U[rows], first[rows]).outcome(given) for rows in chunks
-    ]
+    wanted = _wanted(space.chain, components, space.length)
+    parts = []
+    for n in range(0, max(len(U), 1), CHUNK):
+        rows = slice(n, n + CHUNK)
+        parts.append(_Search(space, wanted, *effort, U[rows], first[rows]).outcome(given))
     return Outcome(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+@lru_cache(maxsize=64)
+def _wanted(chain: JointChain, components: Components, length: float) -> Constraints:
+    """Constraints of a pose: the same for the same space, so that they are prepared once."""
+    return Constraints(chain, components, np.zeros((0, chain.k)), np.zeros(0), length)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

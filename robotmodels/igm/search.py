@@ -233,19 +233,13 @@ def _singular_pose(
         q, free = completed(wanted, U, found.q[0, i], reference)
         if free.any():
             found.valid[0, i] = False
-            part = no_postures(1, len(q), chain.k)
-            part.q[0], part.free[0], part.family[0] = in_half_open_turn(chain.sigma, q), free, True
-            part.residual[0] = wanted.met(np.repeat(U, len(q), axis=0), part.q[0], tolerances)[0]
-            part.valid[0] = part.residual[0] <= max(tolerances)
+            part = collected(wanted, U, q, np.zeros(len(q), np.int64), tolerances)
+            part.free[0], part.family[0] = part.valid[0][:, None] & free, part.valid[0]
             # most rows lead to members that are known: merged at once they stay few
             members = side_by_side([members, part]).merge(chain.sigma)
-        elif _is_flat(wanted, U, found.q[0, i]):
-            found.double[0, i] = True
+        else:
+            found.double[0, i] |= _null_projectors(wanted, U, found.q[:, i], ()).any()
     return side_by_side([members, found]).merge(chain.sigma)
-
-
-def _is_flat(wanted: Constraints, U: Array, q: Array) -> bool:
-    return bool(_null_projectors(wanted, U, q[None], ()).any())
 
 
 def completed(
