@@ -123,7 +123,7 @@ class LimitsReport(Value):
     ----------
     limits : MotionLimits
         Of n joints.
-    position, velocity, acceleration, jerk : ndarray, shape (2, ..., n)
+    position, velocity, acceleration, jerk : ndarray, shape (2, n)
         Least and greatest values of the motion, ends included. Infinite where the quantity below
         jumps inside the motion.
     tolerance : float
@@ -149,9 +149,9 @@ class LimitsReport(Value):
         Duration times this keeps velocity, acceleration and jerk. Positions are not touched.
         """
         need = 0.0
-        for order, (name, least, most) in enumerate(ranges_of(self.limits)):
+        for order, (name, least, most) in enumerate(ranges_of(self.limits)[1:], 1):
             low, high = getattr(self, name)
-            for value, bound in ((high, most), (-low, -least)) if order else ():
+            for value, bound in ((high, most), (-low, -least)):
                 with np.errstate(divide="ignore", invalid="ignore"):
                     ratio = np.where((value > 0.0) & np.isfinite(bound), value / bound, 0.0)
                 need = max(need, float(ratio.max(initial=0.0)) ** (1.0 / order))
@@ -161,13 +161,15 @@ class LimitsReport(Value):
         """The limits that are not kept, one sentence each."""
         found = []
         for name, least, most in ranges_of(self.limits):
-            low, high = (x.reshape(-1, x.shape[-1]) for x in getattr(self, name))
-            for j, bounds in enumerate(zip(most, least, strict=True)):
-                ends = (high[:, j].max(initial=-np.inf), low[:, j].min(initial=np.inf))
-                for value, bound, side in zip(ends, bounds, (1.0, -1.0), strict=True):
-                    size = max(abs(bound), float(name == "position"))
-                    if size < np.inf and side * (value - bound) > self.tolerance * size:
-                        found.append(f"joint {j + 1}: {name} {value:.6g}, allowed {bound:.6g}")
+            low, high = getattr(self, name)
+            for value, bound, side in ((high, most, 1.0), (low, least, -1.0)):
+                some = np.flatnonzero(np.isfinite(bound))
+                over = side * (value[some] - bound[some])
+                size = np.maximum(np.abs(bound[some]), float(name == "position"))
+                found += [
+                    f"joint {j + 1}: {name} {value[j]:.6g}, allowed {bound[j]:.6g}"
+                    for j in some[over > self.tolerance * size]
+                ]
         return tuple(found)
 
     def __repr__(self) -> str:

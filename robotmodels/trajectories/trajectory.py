@@ -42,8 +42,7 @@ class Samples(Sampled):
     t : ndarray, shape (N,)
         Times, s.
     q, v, a, jerk : ndarray, shape (N, n)
-        Positions and their first three derivatives, rad or m, and per s; (..., N, n) of
-        `joint_trajectory` of several motions.
+        Positions and their first three derivatives, rad or m, and per s.
     """
 
     t: Array
