@@ -157,14 +157,10 @@ class Arm:
 
     def splits(self, inverse: bool) -> Iterator[Split]:
         """Ways to write the equation while some joints are known; simplest first."""
-        k, joints = self.form.k, self.joints
-        m = 0
-        while m < k and joints.knows(m):
-            m += 1
-        last = k
-        while last > m and joints.knows(last - 1):
-            last -= 1
-        for s in range(m, last):
+        k = self.form.k
+        unknown = [j for j in range(k) if not self.joints.knows(j)]
+        last = unknown[-1] + 1
+        for s in range(unknown[0], last):
             oblique = not _is_right(self.K[s].R)
             for p in (*((k,) if last < k else ()), *range(last, s, -1)):
                 for twist in (False, True) if oblique else (False,):

@@ -65,16 +65,11 @@ class Graph:
         """Values of an expression at the sample postures."""
         return e[0] * self.nodes[e[1]].values
 
-    def size(self, e: Expression) -> float:
-        """Largest of them."""
-        return float(np.abs(self.values(e)).max())
-
     def _new(self, key: object, node: Node) -> int:
-        found = self._known.get(key)
-        if found is None:
-            found = self._known[key] = len(self.nodes)
+        if key not in self._known:
+            self._known[key] = len(self.nodes)
             self.nodes.append(node)
-        return found
+        return self._known[key]
 
     def symbol(self, kind: Kind, name: str, latex: str, values: Array) -> Expression:
         """A symbol; one name is one symbol."""
@@ -102,13 +97,10 @@ class Graph:
             return number, nodes[0] if nodes else ONE
         nodes.sort()
         key = (Kind.PRODUCT, *nodes)
-        found = self._known.get(key)
-        if found is None:
-            values = self.nodes[nodes[0]].values
-            for node in nodes[1:]:
-                values = values * self.nodes[node].values
-            found = self._new(key, Node(Kind.PRODUCT, tuple((1.0, n) for n in nodes), values))
-        return number, found
+        if key not in self._known:
+            values = np.prod([self.nodes[node].values for node in nodes], axis=0)
+            self._new(key, Node(Kind.PRODUCT, tuple((1.0, n) for n in nodes), values))
+        return number, self._known[key]
 
     def sum(self, terms: Iterable[Expression]) -> Expression:
         """The sum: equal terms are joined, what is zero at every posture is zero."""
@@ -124,14 +116,13 @@ class Graph:
         sign = 1.0 if kept[0][1] > 0.0 else -1.0
         parts = tuple((sign * f, n) for n, f in kept)
         key = (Kind.SUM, parts)
-        found = self._known.get(key)
-        if found is None:
+        if key not in self._known:
             each = np.array([f * self.nodes[n].values for f, n in parts])
             values = each.sum(axis=0)
             if not self.strict and np.abs(values).max() <= DUST * np.abs(each).max():
                 return ZERO
-            found = self._new(key, Node(Kind.SUM, parts, values))
-        return sign, found
+            self._new(key, Node(Kind.SUM, parts, values))
+        return sign, self._known[key]
 
     def dot(self, *pairs: tuple[Expression, ...]) -> Expression:
         """Sum of products."""

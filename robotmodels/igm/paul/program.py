@@ -198,7 +198,9 @@ def compile_plan(arm: Arm, steps: Sequence[Step]) -> Program:
     parts = [rows, starts, [where for _, where, _ in operations], results, form.sigma]
     places = np.cumsum([layout.HEAD, *(np.size(p) for p in parts)])
     factors = [f for _, _, f in operations]
-    scales = [_scale(step, graph) for step in steps]
+    # usual sizes of the coefficients that must not all be zero for a step to have an answer
+    amplitudes = [[graph.values(s.coefficients[i]) for i in s.type.amplitude] for s in steps]
+    scales = [np.abs(values).max(initial=0.0) if values else 1.0 for values in amplitudes]
     numbers = [
         factors, table.initial, references, form.before[:3], form.after, form.lever, scales,
         TOLERANCES, np.zeros(3 * form.k),
@@ -224,11 +226,6 @@ def _unknown(arm: Arm, number: int, table: _Registers, level: int) -> tuple[Expr
         symbols = value, C, S
     table.of |= {e[1]: (r, level) for e, r in zip(symbols, register, strict=False)}
     return value, register[0]
-
-
-def _scale(step: Step, graph: Graph) -> float:
-    """Usual size of the coefficients that must not all be zero for the step to have an answer."""
-    return max((graph.size(step.coefficients[i]) for i in step.type.amplitude), default=1.0)
 
 
 def _reference(arm: Arm, number: int) -> Array:
