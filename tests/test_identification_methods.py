@@ -88,26 +88,20 @@ def test_covariances_hold_over_many_logs(method):
 # --- weights ----------------------------------------------------------------------------------
 
 
-def test_covariance_of_few_equations_is_that_of_the_textbook(rng):
-    A, y = rng.normal(size=(12, 3)), rng.normal(size=12)
-    found = ordinary(of_columns(A, y))
-    squares = np.linalg.lstsq(A, y)[1][0]
-    np.testing.assert_allclose(found.sigma, np.sqrt(squares / 9), rtol=1e-12)
-    expected = squares / 9 * np.linalg.inv(A.T @ A)
-    np.testing.assert_allclose(found.covariance, expected, rtol=1e-10, atol=1e-12)
-
-
-def test_deviations_of_two_groups_share_the_parameters_by_leverage(rng):
-    sides = [(rng.normal(size=(n, 3)) * s, rng.normal(size=n)) for n, s in ((30, 1.0), (15, 0.2))]
-    A = np.vstack([A for A, _ in sides])
-    x = np.linalg.lstsq(A, np.concatenate([y for _, y in sides]))[0]
-    inverse = np.linalg.inv(A.T @ A)
-    expected = [
+@pytest.mark.parametrize("sizes", [((12, 1.0),), ((30, 1.0), (15, 0.2))])
+def test_deviations_and_covariance_of_few_equations_are_those_of_the_textbook(sizes, rng):
+    """Groups share the parameters by leverage."""
+    sides = [(rng.normal(size=(n, 3)) * s, rng.normal(size=n)) for n, s in sizes]
+    A, y = (np.concatenate(parts) for parts in zip(*sides, strict=True))
+    x, inverse = np.linalg.lstsq(A, y)[0], np.linalg.inv(A.T @ A)
+    sigma = [
         np.sqrt(((y - A @ x) ** 2).sum() / (len(y) - np.trace(A @ inverse @ A.T))) for A, y in sides
     ]
+    expected = ((y - A @ x) ** 2).sum() / (len(y) - 3) * inverse
     found = ordinary(grouped(*sides))
     np.testing.assert_allclose(found.values, x, rtol=1e-11)
-    np.testing.assert_allclose(found.sigma, expected, rtol=1e-11)
+    np.testing.assert_allclose(found.sigma, sigma, rtol=1e-11)
+    np.testing.assert_allclose(found.covariance, expected, rtol=1e-10, atol=1e-12)
 
 
 # --- outliers ---------------------------------------------------------------------------------

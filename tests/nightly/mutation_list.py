@@ -1172,7 +1172,7 @@ MUTATIONS = [
     Mutation("identification: weighting", "deviations forget what the parameters took",
         "def residual_std(", "np.maximum(counts - leverage, 1e-300)",
         "np.maximum(counts + leverage, 1e-300)",
-        "tests/test_identification_methods.py -k deviations_of_two_groups"),
+        "tests/test_identification_methods.py -k textbook"),
     Mutation("identification: instruments", "deviations by the inverse twice, untransposed",
         "standard_errors=scale", "(inverse, axis=1)", "(inverse, axis=0)",
         "tests/test_identification_closed_loop.py -k step_of_instruments"),
@@ -1275,7 +1275,7 @@ MUTATIONS = [
     Mutation("identification: least squares", "the variance of residuals is that of all equations",
         "def ordinary(factors", "rest / (factors.rows - len(values))", "rest / factors.rows",
         ("tests/test_identification_methods.py -k"
-         " covariance_of_few_equations"), True),
+         " textbook"), True),
     Mutation("identification: processing", "the dead band forgets the noise of velocities",
         "def _completed(\n    log: Log", "np.maximum(0.003 * fastest, 4.0 * velocity_noise)",
         "0.003 * fastest",
