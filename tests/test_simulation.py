@@ -272,6 +272,8 @@ def test_maps_over_joints():
         (panda, 3, [panda.lower[3], panda.upper[3]]), (pendulum(), 0, [-np.pi, np.pi]),
     ):  # fmt: skip
         assert dynamics_map(model, j, samples=2).ranges[0] == pytest.approx(ends)
+    with pytest.raises(InvalidValueError, match="whole numbers"):
+        dynamics_map(arm, (1, 2), samples=(3, 2.5))
 
 
 # --- feedback ----------------------------------------------------------------------------------

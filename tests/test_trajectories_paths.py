@@ -305,6 +305,8 @@ def test_leaving_the_reach_is_located_and_explained():
     x = move.pose(event.start)[[0, 2], 3] - [0.0, 0.5]
     assert abs(np.hypot(*x) - 0.4) < 1e-8
     assert "leaves the reach" in repr(path)
+    again = joint_path(arm, move.pose(path.t), path.q[0], t=path.t, mask="position")
+    assert np.isfinite(again.v[: event.first]).all()  # the velocity beside the gap too
     # stretched at the edge: singular, and infinitely fast
     assert path.of_kind(PathEventKind.SINGULAR)[-1].last == event.first - 1
 

@@ -106,6 +106,8 @@ def dynamics_map(
         raise InvalidValueError(f"ranges: expected ascending ends, got {ends.tolist()}.")
     counts = as_each(samples, k, "samples", least=2.0, finite=True, default=181 if k == 1 else 61)
     sizes = counts.astype(int).tolist()
+    if sizes != counts.tolist():
+        raise InvalidValueError(f"samples: expected whole numbers, got {counts.tolist()}.")
     values = [np.linspace(a, b, size) for (a, b), size in zip(ends, sizes, strict=True)]
     grid = np.broadcast_to(base, (*sizes, n)).copy()
     for j, column in zip(columns, np.meshgrid(*values, indexing="ij"), strict=True):

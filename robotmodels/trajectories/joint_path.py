@@ -165,7 +165,11 @@ def joint_path(
     rows.q[np.ix_(rows.reached, still)] = rest[still]
     q = continuous(model, rows.q, rows.reached, near)
     task = Task(model, T, q, rows.reached, mask, mask_axes, columns)
-    v = task.rates(twists) if twists is not None and task.square else _differences(times, q)
+    v = (
+        task.rates(twists)
+        if twists is not None and task.square
+        else _differences(times, q, rows.reached)
+    )
     events = path_events(model, times, q, v, rows, task, singular_below, start)
     if motion is not None:
         pose = motion.pose
@@ -173,11 +177,16 @@ def joint_path(
     return JointPath(times, q, v, rows.status, task.conditioning, rows.branch, tuple(events))
 
 
-def _differences(times: Array, q: Array) -> Array:
-    """Velocities from the neighbours of each pose on either side; NaN beside a gap."""
+def _differences(times: Array, q: Array, reached: NDArray[np.bool_]) -> Array:
+    """Velocities from the neighbours of each pose on either side that are reached."""
     if np.isnan(times).any() or len(q) < 2:
         return np.full(q.shape, np.nan)
-    return np.gradient(q, times, axis=0)
+    with np.errstate(invalid="ignore"):
+        slope = np.diff(q, axis=0) / np.diff(times)[:, None]
+    none = np.full((1, q.shape[1]), np.nan)
+    left, right = np.vstack((none, slope)), np.vstack((slope, none))
+    both = np.where(np.isnan(left), right, np.where(np.isnan(right), left, 0.5 * (left + right)))
+    return np.where(reached[:, None], both, np.nan)
 
 
 def _located(event: PathEvent, times: Array, reached: Callable[[float], Any]) -> PathEvent:

@@ -15,7 +15,6 @@ Book section 4.2; Khalil and Dombre, Modeling, identification and control of rob
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from enum import Enum
 
@@ -62,37 +61,39 @@ def along_line(
     return law_motion(law, *joint_vectors(q0=q0, q1=q1), duration, limits, how)
 
 
-def _by(law: TimeLaw, text: str) -> Callable[..., Trajectory]:
-    """The function of one law, explained by the text."""
-
-    def move(
-        q0: ArrayLike,
-        q1: ArrayLike,
-        duration: float | None = None,
-        limits: MotionLimits | None = None,
-        synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
-    ) -> Trajectory:
-        return along_line(law, q0, q1, duration, limits, synchronisation)
-
-    move.__doc__, move.__name__ = text, law.name.lower()
-    move.__qualname__ = move.__name__
-    return move
+def linear(
+    q0: ArrayLike,
+    q1: ArrayLike,
+    duration: float | None = None,
+    limits: MotionLimits | None = None,
+    synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
+) -> Trajectory:
+    """Constant velocity; it jumps at both ends, so that no acceleration limit holds there."""
+    return along_line(TimeLaw.LINEAR, q0, q1, duration, limits, synchronisation)
 
 
-linear = _by(
-    TimeLaw.LINEAR,
-    "Constant velocity; it jumps at both ends, so that no acceleration limit holds there.",
-)
-bang_bang = _by(
-    TimeLaw.BANG_BANG,
+def bang_bang(
+    q0: ArrayLike,
+    q1: ArrayLike,
+    duration: float | None = None,
+    limits: MotionLimits | None = None,
+    synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
+) -> Trajectory:
     """Constant acceleration, then constant deceleration, without a cruise between them.
 
     With asymmetric limits the two parts share the time so that both accelerations are used in
     full; without limits they are equal.
-    """,
-)
-trapezoidal = _by(
-    TimeLaw.TRAPEZOIDAL,
+    """
+    return along_line(TimeLaw.BANG_BANG, q0, q1, duration, limits, synchronisation)
+
+
+def trapezoidal(
+    q0: ArrayLike,
+    q1: ArrayLike,
+    duration: float | None = None,
+    limits: MotionLimits | None = None,
+    synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
+) -> Trajectory:
     """Trapezoidal velocity: the quickest motion under limits of velocity and acceleration.
 
     Also called linear segment with parabolic blends, ``lspb``. Without limits the ramps take a
@@ -104,16 +105,23 @@ trapezoidal = _by(
     >>> move = trapezoidal([0.0, 0.0], [1.0, -1.0], limits=limits)
     >>> move.duration, move.v(0.75)
     (1.50..., array([ 1., -1.]))
-    """,
-)
-smoothed_trapezoidal = _by(
-    TimeLaw.SMOOTHED_TRAPEZOIDAL,
+    """
+    return along_line(TimeLaw.TRAPEZOIDAL, q0, q1, duration, limits, synchronisation)
+
+
+def smoothed_trapezoidal(
+    q0: ArrayLike,
+    q1: ArrayLike,
+    duration: float | None = None,
+    limits: MotionLimits | None = None,
+    synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
+) -> Trajectory:
     """Smoothed trapezoidal velocity: ramps whose acceleration is a parabola of time.
 
     The acceleration is continuous, also at the ends. A ramp to the velocity V takes
     ``1.5 V / acceleration``, or longer where a limit of jerk needs it.
-    """,
-)
+    """
+    return along_line(TimeLaw.SMOOTHED_TRAPEZOIDAL, q0, q1, duration, limits, synchronisation)
 
 
 def cubic(
