@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
+from functools import reduce
 
 import numpy as np
 
@@ -98,7 +99,7 @@ class Graph:
         nodes.sort()
         key = (Kind.PRODUCT, *nodes)
         if key not in self._known:
-            values = np.prod([self.nodes[node].values for node in nodes], axis=0)
+            values = reduce(np.multiply, (self.nodes[node].values for node in nodes))
             self._new(key, Node(Kind.PRODUCT, tuple((1.0, n) for n in nodes), values))
         return number, self._known[key]
 
