@@ -200,9 +200,8 @@ def test_far_start_and_wrong_jacobian():
     t = np.linspace(0.1, 2, 40)
 
     def rosenbrock(x):
-        return np.array([10 * (x[1] - x[0] ** 2), 1 - x[0]]), np.array(
-            [[-20 * x[0], 10.0], [-1, 0]]
-        )
+        J = [[-20 * x[0], 10.0], [-1, 0]]
+        return np.array([10 * (x[1] - x[0] ** 2), 1 - x[0]]), np.array(J)
 
     fit = fit_nonlinear(rosenbrock, [-1.2, 1.0])
     assert fit.converged

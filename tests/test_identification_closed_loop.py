@@ -81,20 +81,6 @@ def off(found, truth, factors):
 # --- simulation -----------------------------------------------------------------------------------
 
 
-@pytest.mark.sampled(3)
-@pytest.mark.parametrize("kind", KINDS)
-def test_simulated_accelerations_are_those_of_the_direct_model(kind):
-    arm, control, log, width = recorded(kind, 0.3, substeps=2)
-    fast = (np.abs(log.v) > width).all(axis=1)
-    if arm.transmission is not None:
-        fast &= (np.abs(log.v @ arm.transmission.weights.T) > width).all(axis=1)
-    assert fast.sum() > 20
-    a = rm.ddm(arm, log.q[fast], log.v[fast], log.tau[fast])
-    assert np.allclose(log.a[fast], a, rtol=1e-9, atol=1e-9 * np.abs(a).max())
-    tau = control.kp * (log.q_ref - log.q) + control.kd * (log.v_ref - log.v)
-    assert np.allclose(log.tau, tau, rtol=1e-12, atol=1e-12 * np.abs(tau).max())
-
-
 def test_the_motion_is_that_of_simulate_and_steps_converge_with_order_four():
     arm = ROBOTS["rx90"]
     arm = arm.with_drive(replace(arm.drive, Fc=np.zeros(6)))

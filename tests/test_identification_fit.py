@@ -360,11 +360,6 @@ def test_the_sentence_names_joints_parts_and_the_log():
     assert "on the held-out log: joint_2 (200 %)" in sentence
     assert "joint_1" not in sentence
     assert "worse than predicting zero torque: joint_2." in sentence
-    assert "do not generalise" in sentence
-    # the same log fitted, which no parameters explain
-    _, (sentence,) = noticed(arm(), wrong, checked=False)
-    assert "on the log: joint_" in sentence
-    assert "signs" in sentence
 
 
 def test_noise_and_ripple_that_no_model_explains_are_no_poor_prediction():
@@ -399,7 +394,6 @@ def test_a_robot_that_diverged_has_no_numbers_that_look_like_results(tmp_path):
     for numbers in (found.values, found.standard_errors, found.covariance, white,
                     errors.in_sample.rmse, errors.held_out.filtered_relative):  # fmt: skip
         assert np.isnan(numbers).all()
-    assert "diverged" in repr(found)
     q = np.zeros(2)
     for refused in (
         lambda: predicted_torque(found, q, q, q),

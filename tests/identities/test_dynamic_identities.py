@@ -174,6 +174,9 @@ def test_coriolis_matrix_is_made_of_christoffel_symbols(model, seed):
     symbols = 0.5 * (np.einsum("kij->ijk", dM) + np.einsum("jik->ijk", dM) - dM)
     close(rm.coriolis_matrix(model, q, v), symbols @ v, 1e-11)
     close(rm.coriolis_matrix(model, [q], v)[0], symbols @ v, 1e-11)
+    j, k = np.triu_indices(n, 1)
+    B, C = christoffel_blocks(model, q[None])
+    close(B[0] @ (v[j] * v[k]) + C[0] @ v**2, symbols @ v @ v, 1e-11)
 
 
 # --- gravity ---------------------------------------------------------------------------------
@@ -240,17 +243,6 @@ def test_numbers_keep_their_digits_at_any_size(size, model, seed):
 
 
 # --- friction, payloads and base parameters ------------------------------------------------------
-
-
-@given(model=any_models(), seed=seeds)
-def test_christoffel_blocks_are_the_coriolis_torques(model, seed):
-    q, v, _ = random_state(model, np.random.default_rng(seed), 3)
-    B, C = christoffel_blocks(model, q)
-    j, k = np.triu_indices(model.n, 1)
-    torque = np.einsum("sip,sp->si", B, v[:, j] * v[:, k]) + np.einsum("sij,sj->si", C, v**2)
-    close(torque, np.einsum("sij,sj->si", rm.coriolis_matrix(model, q, v), v), 1e-12)
-    for one, many in zip(christoffel_blocks(model, q[0]), (B[0], C[0]), strict=True):
-        np.testing.assert_array_equal(one, many)
 
 
 @given(model=models(tip="any"), seed=seeds)
