@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 from identities.chain_search import apart, draw, searched
+from scipy.optimize import brentq
 
 import robotmodels as rm
 from robotmodels.igm.elimination import elimination_solutions, prepare_elimination
@@ -164,6 +165,34 @@ def test_the_count_is_that_of_an_independent_search(seed, sigma, rng):
 
 
 # --- singular poses ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("eps", [0.0, 1e-9, 1e-6, 1e-5, 1e-4, 1e-3])
+def test_folds_of_random_arms(eps, rng):
+    """Poses on and beside singular ones, where two solutions meet, by the direct model alone."""
+    alpha, (d, r) = rng.uniform(0.3, 2.8, 6), rng.normal(0.0, 0.5, (2, 6))
+    model = rm.RobotModel.from_table(
+        rm.DHTable(antecedent=range(6), sigma=[0] * 6, alpha=alpha, d=d, r=r)
+    )
+
+    def determinant(t, a, way):
+        return np.linalg.det(rm.jacobian(model, a + t * way))
+
+    q0 = []
+    while len(q0) < 40:
+        line = rng.uniform(-np.pi, np.pi, 6), rng.uniform(-1.0, 1.0, 6)
+        if determinant(0.0, *line) * determinant(1.0, *line) < 0.0:
+            t = brentq(determinant, 0.0, 1.0, line, xtol=1e-15)
+            q0.append(line[0] + (t + eps) * line[1])
+    found = rm.igm(model, rm.dgm(model, q0))
+    away = np.abs(np.remainder(found.q - np.array(q0)[:, None] + np.pi, 2 * np.pi) - np.pi)
+    assert np.nanmin(away.max(axis=-1), axis=1).max() < (1e-5 if eps < 1e-5 else 1e-8)
+    double = found.double.any(axis=1)
+    if eps <= 1e-9:
+        assert double.sum() >= 36
+    if eps >= 1e-4:
+        assert not double.any()
+        assert (found.count % 2 == 0).all()
 
 
 @pytest.mark.parametrize(("eps", "share"), [(1e-5, 0.15), (1e-4, 0.02), (3e-4, 0.0)])

@@ -216,7 +216,7 @@ def test_aligned_and_stretched_postures_take_the_reference(name, places, freed):
 
 
 @pytest.mark.parametrize("joint", [1, 5])
-@pytest.mark.parametrize("tiny", [1e-12, 1e-10, 1e-8, 1e-6, 1e-3])
+@pytest.mark.parametrize("tiny", [1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3])
 def test_both_branches_beside_an_aligned_joint(joint, tiny):
     """Its neighbours are known by their sum only, the better the farther it is from aligned."""
     q = random_postures(60, seed=7)
