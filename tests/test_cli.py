@@ -185,7 +185,7 @@ def test_igm_gives_what_the_call_returns(run, case):
     assert (result["reason"], result["method"]) == (found.reason(), found.method)
     text = run("igm", name, *words)[1]
     assert ("joint_4 took the reference;" in text) == (case == "singular")
-    assert ("asked for: x y z rx ry in tool axes" in text) == (case == "tool axes")
+    assert ("requested: x y z rx ry in tool axes" in text) == (case == "tool axes")
 
 
 def test_a_pose_that_is_not_reached_says_why(run):

@@ -30,7 +30,7 @@ examples:
   robotmodels igm iiwa14 --q 10 30 0 -80 0 40 0 --degrees --arm-angle 20"""
 DESCRIPTION = """\
 Inverse geometric model: print every posture that brings the robot's tool to a pose, with its
-branch, what it misses and whether it is inside the joint limits; or why there is none. Lengths are
+branch, its error and whether it is inside the joint limits; or why there is none. Lengths are
 in m, angles in rad unless --degrees is given."""
 OPTIONS = """\
 @robot
@@ -38,10 +38,10 @@ OPTIONS = """\
 the pose of the tool, in one of three ways:
 --xyz X Y Z [] position in world axes
 --rpy R P Y [] with --xyz: roll, pitch and yaw of the orientation, Rot(z,Y) Rot(y,P) Rot(x,R); may
-    be left out if --mask asks for no rotation
+    be left out if --mask requests no rotation
 --matrix NUMBERS [] 16 numbers of the 4x4 pose, row by row
 --q NUMBERS [] the pose that these joint variables (or a named configuration) lead to
-what is asked for:
+the request:
 @degrees
 --limits [flag] only postures inside the joint limits
 --q-ref NUMBERS [] order by the distance to this posture; joints that the pose leaves free take its
@@ -50,7 +50,7 @@ what is asked for:
 --mask-axes [world|tool =world] axes of the mask
 --lock JOINT=VALUE [repeated] a joint, by name or number from 1, that keeps a value; may be repeated
 --arm-angle ANGLE [] seven-joint arms: angle of the elbow about the line from shoulder to wrist
---tolerance NUMBERS [] how much may be missing: metres and radians, or one number for both (default
+--tolerance NUMBERS [] largest error: metres and radians, or one number for both (default
     1e-9); poses given with few digits need more"""
 NOT_REACHED = "the pose is not reached"
 
@@ -81,7 +81,7 @@ def run(arguments: argparse.Namespace) -> Report:
 
 
 def mask_of(text: str | None) -> Array | None:
-    """What has to be met, from six numbers or a word."""
+    """Requested components, from six numbers or a word."""
     if text is None:
         return None
     if text.isalpha():
@@ -90,7 +90,7 @@ def mask_of(text: str | None) -> Array | None:
 
 
 def pose_of(arguments: argparse.Namespace, model: RobotModel, mask: Array | None) -> Array:
-    """The pose asked for."""
+    """The requested pose."""
     ways = ("--xyz", "--matrix", "--q")
     given = [w for w in ways if getattr(arguments, w.removeprefix("--")) is not None]
     if len(given) != 1:
@@ -107,7 +107,7 @@ def pose_of(arguments: argparse.Namespace, model: RobotModel, mask: Array | None
     if arguments.rpy is None:
         if mask is None or mask[3:].any():
             raise InvalidValueError(
-                "--xyz: the orientation is missing; add --rpy, or ask for the position alone with "
+                "--xyz: the orientation is missing; add --rpy, or request the position alone with "
                 "--mask position."
             )
         return se3.translation(*xyz)
@@ -173,7 +173,7 @@ def as_json(model: RobotModel, T: Array, found: IGMSolutions, degrees: bool) -> 
 
 
 def as_text(data: dict[str, Any], mask_axes: str = "world") -> str:
-    """The same for people."""
+    """Solutions of one pose as text."""
     names, units, rows = data["joints"], data["units"], data["postures"]
     lines = [
         f"{data['robot']}: {len(rows)} posture{'s' * (len(rows) != 1)}. {data['reason']}",
@@ -182,7 +182,7 @@ def as_text(data: dict[str, Any], mask_axes: str = "world") -> str:
     ]
     if not all(data["mask"]):
         asked = " ".join(np.array(["x", "y", "z", "rx", "ry", "rz"])[np.array(data["mask"]) > 0])
-        lines.append(f"asked for: {asked} in {mask_axes} axes")
+        lines.append(f"requested: {asked} in {mask_axes} axes")
     if rows:
         columns = [
             ("", [str(k + 1) for k in range(len(rows))]),

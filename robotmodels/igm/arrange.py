@@ -56,7 +56,7 @@ class PlanRows(NamedTuple):
         return self.arm.plan
 
     def rows(self) -> Rows:
-        """The same as any other method has it: nothing is double, free or in a family."""
+        """The same rows as of other methods; none is double, free or in a family."""
         S, most = self.q.shape[1], self.most
         code = self.marks[:, 2 : 2 + most]
         free, family = np.zeros((2, len(code), most, self.q.shape[2]), np.bool_)

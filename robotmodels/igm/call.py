@@ -37,7 +37,7 @@ REASON = (4, 60)
 THOROUGH = (100, 40)
 """The same where no method proves that there is none."""
 NEAR = 1e-5
-"""Error up to which a closest posture says nothing of the reach: it is refined [m, rad]."""
+"""Error below which a closest posture is refined before it decides about the reach [m, rad]."""
 
 _FLOAT = np.dtype(np.float64)
 

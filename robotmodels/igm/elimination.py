@@ -1,14 +1,14 @@
 """All IK solutions of a general six-joint arm, up to 16, by Raghavan and Roth's elimination.
 
-The method needs no special axes, and is the worse the more special they are: with a spherical
-wrist or three parallel axes its equations become dependent. Pieper's and Paul's methods serve
-those arms; a self-test tells whether this one may. Where two solutions are one within rounding
-all forms are tried; self-motions are not followed.
+The method needs no special geometry and becomes inaccurate near it: with a spherical wrist or
+three parallel axes its equations become dependent. Pieper's and Paul's methods serve those arms;
+a self-test decides whether elimination may serve an arm. Where two solutions are one within
+rounding all forms are tried; self-motions are not followed.
 
 Of the loop of six joints any may be the one that drops out, its two neighbours to one side the pair
 that is eliminated linearly, and of the other three an outer one gives the eigenvalues: 24 forms.
-They are equal in theory and far from it in rounding: all are tried on random poses, and the best
-are kept.
+They are equal in theory, but differ much in rounding errors: all are tried on random poses, and
+the best are kept.
 
 References
 ----------

@@ -1,4 +1,4 @@
-"""Which solver serves an arm: the order in which they are tried, and the cache of prepared ones."""
+"""Choice of the solver of an arm: the order of trial, and the cache of prepared solvers."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ def igm(
     in the chain; arms that are one of these up to calibration errors; elimination, up to 16
     postures, for other six-joint arms; virtual joints for arms of fewer joints and for masks; the
     arm angle or locked joints for seven joints and more; a numeric search from many starts for the
-    rest. ``print(found.method)`` says which.
+    rest. ``found.method`` names it.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def igm(
     q_ref : array_like, shape (..., n), optional
         Reference postures [rad or m]; the leading axes broadcast with those of ``T``. Solutions
         are ordered by their distance to it, and joints that a pose leaves free take its value
-        (0 without it; where no posture exists at that value, the nearest one where one does).
+        (0 without it; where no posture has that value, the nearest value with a posture).
         Joints that do not move the tool keep its value (0 without it; with ``limits`` within them);
         they are no redundancy: the others are solved as if they were the whole arm.
     mask : array_like, shape (6,), or {"position", "xyz", "orientation"}, optional
@@ -63,10 +63,10 @@ def igm(
         angle of the elbow about the line from shoulder to wrist [rad], right-handed. The axes of
         an array are added behind those of ``T``. Without it the angle of ``q_ref`` is taken.
     position_tolerance : float
-        Metres. What is missing of the position may be as long as this. For poses given with few
-        digits take wider tolerances; what is singular is decided on the pose as it is given.
+        Metres. Largest error of the position. For poses given with few
+        digits take wider tolerances; singularity is decided on the pose as it is given.
     orientation_tolerance : float
-        Radians, on the rotation that is missing.
+        Radians. Largest error of the rotation.
     relations : (array_like (m, n), array_like (m,)), optional
         Added relations ``A q = b`` between the joints of a redundant arm, as many as it has
         joints more than six (the book's second strategy; locking is the first). They hold modulo
@@ -91,14 +91,14 @@ def igm(
     1e-6) candidates at perturbed poses are added and self-motions are continued to the reference,
     which takes milliseconds. Redundant arms are quick at a ``q_ref`` from which the pose can be
     reached; else the nearest value of the first free joint is searched, in
-    some 0.2 s a pose. Status ``INCOMPLETE`` says that solutions or a nearer value may be missing:
+    some 0.2 s a pose. Status ``INCOMPLETE`` means that solutions or a nearer value may be missing:
     after that search, with relations between several joints, and where neither a closed form nor
-    elimination serves (masks that free two rotations, unless the arm turns about the asked axis
-    only; some arms with two prismatic joints).
-    Poses without one are given to a short numeric search, `igm_numeric`, which says why: too far,
+    elimination serves (masks that free two rotations, unless the arm turns about the requested
+    axis only; some arms with two prismatic joints).
+    For poses without a posture a short numeric search, `igm_numeric`, gives the reason: too far,
     too near, or the orientation not available there. An arm outside every family (more joints
-    than can be solved, or a degenerate one) gets the single posture of that search, and
-    ``method`` says so.
+    than can be solved, or a degenerate one) gets the single posture of that search, as
+    ``method`` states.
 
     References
     ----------

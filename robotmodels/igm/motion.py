@@ -1,4 +1,4 @@
-"""Where a chain stands and how it moves at many postures at once, for the choices of families.
+"""Poses, axes and Jacobians of a chain at many postures, for the choice of its solver.
 
 Plain array code: it runs when an arm is prepared and on the few postures that are singular.
 """
@@ -41,7 +41,7 @@ def cross(a: Array, b: Array) -> Array:
 
 
 def random_postures(chain: JointChain, count: int, rng: np.random.Generator) -> Array:
-    """Postures for trying an arm out, shape (count, k): any angle, lengths like the arm's own."""
+    """Random postures for tests of an arm (count, k): any angle, lengths of the arm's size."""
     length = lever(chain)
     return np.where(
         chain.sigma == 0,

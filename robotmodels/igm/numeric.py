@@ -56,7 +56,7 @@ def igm_numeric(
     limits : bool
         As in `igm`, with ``q0`` for ``q_ref``.
     restarts : int
-        How many starts to try beside ``q0``; 0 needs a ``q0``.
+        Number of starts beside ``q0``; 0 needs a ``q0``.
     iterations : int
         Most steps from one start.
 
@@ -64,7 +64,7 @@ def igm_numeric(
     -------
     IGMSolutions
         With one row (S = 1) for every pose, its ``error`` per component, and ``closest``: the
-        posture the search ended with, also where it is no solution. Then ``status`` tells whether
+        posture the search ended with, also where it is no solution. Then ``status`` states whether
         limits are the reason; whether the position is met but the orientation is not (``closest``
         is where the remaining angle is least); or whether the position is too far or too near.
         These are findings of the search, not proofs.

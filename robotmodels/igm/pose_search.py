@@ -162,7 +162,7 @@ class _Search:
     first: Array
 
     def outcome(self, given: bool) -> Outcome:
-        """Solve what can be solved, and give the reason for the rest."""
+        """Postures of the poses that are reached, and the reasons for the others."""
         space, whole, asked = self.space, self.wanted.weight, self.wanted.components.asked
         away = self.U[:, :3, 3] - space.chain.D[0, :3, 3]
         distance = np.hypot(np.hypot(away[:, 0], away[:, 1]), away[:, 2])

@@ -120,8 +120,7 @@ def relations_of(
     m = columns.size - 6
     if m < 1:
         raise InvalidValueError(
-            f"relations: the tool is moved by {columns.size} joints; only more than six leave "
-            "something to relate."
+            f"relations: the tool is moved by {columns.size} joints; relations need more than six."
         )
     if np.delete(A, columns, axis=1).any():
         raise InvalidValueError(

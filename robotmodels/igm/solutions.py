@@ -36,8 +36,8 @@ class IGMSolutions(_Later):
     """Postures that reach the poses of one call. Read-only, picklable.
 
     The leading axes are those of the poses. S is the number of rows kept for each pose: the most
-    solutions found for any of them (always 1 for `igm_numeric`). Rows are packed: what is missing
-    stands last, is NaN in ``q`` and False in ``valid``.
+    solutions found for any of them (always 1 for `igm_numeric`). Rows are packed: rows
+    without a solution come last, NaN in ``q`` and False in ``valid``.
 
     Parameters
     ----------
@@ -46,8 +46,8 @@ class IGMSolutions(_Later):
     valid : ndarray of bool, shape (..., S)
         Whether the row is a solution.
     residual : ndarray, shape (..., S)
-        The larger of the position error in metres and the rotation angle in radians, over what
-        was asked, from a forward pass.
+        The larger of the position error in metres and the rotation angle in radians, of the
+        requested components, by the direct model.
     within_limits : ndarray of bool, shape (..., S)
         Whether the row is a solution inside the joint limits as it stands, no whole turns added.
     code : ndarray of int16, shape (..., S)
@@ -77,7 +77,7 @@ class IGMSolutions(_Later):
         The posture a search ended with, also where it is no solution, rad or m. From a closed form
         only for poses without a solution, NaN for the others.
     missing : ndarray, shape (..., 6), optional
-        What ``closest`` misses, as in ``error``.
+        Translation and rotation that ``closest`` lacks, as in ``error``.
 
     Raises
     ------
@@ -353,7 +353,7 @@ class IGMSolutions(_Later):
 
 
 def _named(what: str, joints: NDArray[np.bool_]) -> str:
-    """Which joints are marked, as columns of q."""
+    """Marked joints, as columns of q."""
     if not joints.any():
         return ""
     return f", {what}: " + " ".join(f"q[{m}]" for m in np.flatnonzero(joints))

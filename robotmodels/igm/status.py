@@ -8,8 +8,8 @@ from .._outcomes import Outcome
 class IGMStatus(Outcome):
     """Outcome of an inverse geometric model for one pose; fits int8.
 
-    ``REACHED``, ``REACHED_FAMILY`` and ``INCOMPLETE`` come with solutions, the others say why
-    there is none.
+    ``REACHED``, ``REACHED_FAMILY`` and ``INCOMPLETE`` come with solutions, the others state
+    why there is none.
 
     Attributes
     ----------

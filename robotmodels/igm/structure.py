@@ -1,7 +1,7 @@
-"""Which axes meet, which are parallel: the structure that a closed form can use.
+"""Structure of an arm for closed forms: axes that meet, axes that are parallel.
 
-The six joints and the pose form a loop. Any joint can be called the first and the loop can be
-walked either way, so one solver for three axes that meet at the end of the chain also serves arms
+The six joints and the pose form a loop. Any joint can be called the first and the loop has no
+direction, so one solver for three axes that meet at the end of the chain also serves arms
 whose shoulder or middle axes meet, and one for three parallel axes those that are mirrored.
 
 Source: D. L. Pieper, "The kinematics of manipulators under computer control", 1968.
@@ -121,7 +121,7 @@ def _concurrent(plan: LoopPlan) -> LoopPlan | None:
 
 
 def _meets_z(point: Array, direction: Array) -> tuple[float, float] | None:
-    """Where a line meets the z axis: its height on z, and the way along the line to get there."""
+    """Intersection of a line and the z axis: height on z, and distance along the line."""
     across = np.hypot(direction[0], direction[1])
     if across < 1e-6:
         return None

@@ -3,7 +3,7 @@
 Six joints have one if three consecutive revolute axes meet in a point or are parallel. The three
 may be virtual (a wrist at a point of any link), or one or two of them real: two virtual axes
 through a point of a real one, one through the crossing of two real ones or parallel to them. Joints
-still missing stand anywhere.
+still missing are placed anywhere.
 """
 
 from __future__ import annotations

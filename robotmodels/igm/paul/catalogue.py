@@ -1,4 +1,4 @@
-"""How the types of equations are recognised, and which of them is taken first."""
+"""Recognition of the types of equations, and their order of preference."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def candidates(equations: Sequence[Equation], joints: Joints) -> list[Step]:
 
 
 def cost(c: Step, joints: Joints) -> tuple[float, ...]:
-    """Price of a candidate: few unknowns, position, one solution, short formulas."""
+    """Cost of a candidate: few unknowns, position, one solution, short formulas."""
     graph, rank = joints.graph, c.type.rank
     items = [joints.unknowns[u] for u in c.unknowns]
     if c.type is EquationType.TYPE_3:

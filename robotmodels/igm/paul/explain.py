@@ -44,7 +44,7 @@ class InverseModelExplanation(Explanation):
     plan : PaulPlan
         The plan that is printed, the same that the kernel runs.
     text, latex : str
-        The derivation; the LaTeX says the same, as paragraphs and amsmath environments.
+        The derivation; the LaTeX has the same content, as paragraphs and amsmath environments.
 
     Examples
     --------
@@ -138,7 +138,7 @@ def explain_igm(model: RobotModel) -> InverseModelExplanation:
 
 
 def _successor(chain: JointChain) -> str:
-    """What solves an arm where Paul's method stops."""
+    """The method that solves an arm where Paul's method stops."""
     if chain.k > 7:
         return "locked joints (`lock` of `igm`), or the numeric solver `igm_numeric`"
     if chain.k == 7:
@@ -159,7 +159,7 @@ def _successor(chain: JointChain) -> str:
 
 
 def _end(words: PlanText, takes_over: str) -> list[str]:
-    """How many postures or what remains, the offsets, and the quadrants."""
+    """Number of postures or the remaining joints, the offsets, and the quadrants."""
     plan = words.plan
     if plan.complete:
         most = plan.most_postures
@@ -178,7 +178,7 @@ def _end(words: PlanText, takes_over: str) -> list[str]:
             "unknowns in a form of the catalogue"
         )
         lines = [f"Paul's method stops here: {rest} remain, because {why}."]
-        lines.append(f"What takes over: {takes_over}.")
+        lines.append(f"The arm is solved by {takes_over}.")
     offsets = []
     for j, row in enumerate(plan.form.rows):
         if abs(row.offset) >= SMALLEST:  # the table shows no others either
@@ -190,13 +190,13 @@ def _end(words: PlanText, takes_over: str) -> list[str]:
         lines.append(f"Joint variables with an offset: {', '.join(offsets)}.")
     if any(s.type in _ARCS for s in plan.steps):
         lines.append(
-            "atan2 keeps the quadrant that arctan(y/x) loses; two solutions are both kept."
+            "atan2 gives the quadrant, which arctan(y/x) does not; two solutions are both kept."
         )
     return lines
 
 
 def _notation(words: PlanText, steps: tuple[ExplainedStep, ...]) -> list[str]:
-    """What C, S and their numbers stand for, with the sums of angles that occur."""
+    """Meaning of C, S and their numbers, with the sums of angles that occur."""
     used = {n for step in steps for n in re.findall(r"\b[CS]([\dm_]+)\b", step.text)}
     joints, sums = words.joints, ""
     for group, members in enumerate(joints.members):

@@ -28,7 +28,7 @@ DUST = 1e-12
 
 
 class Kind(Enum):
-    """What a node is."""
+    """Kinds of nodes."""
 
     ONE = "the number 1"
     CONSTANT = "a constant of the table"

@@ -1,7 +1,7 @@
 """Polynomials in the unknown sines, cosines and lengths; their coefficients are known expressions.
 
 A monomial is a sorted tuple of atoms: cosine, sine or length of an unknown. A polynomial in more
-than two unknowns is of no use to any equation of the catalogue: None stands for it.
+than two unknowns occurs in no equation of the catalogue and is replaced by None.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Products of the arm's matrices and their inverses, as polynomials in what is unknown.
+"""Products of the arm's matrices and their inverses, as polynomials in the unknowns.
 
 They are multiplied out from the right, column by column, so that coefficients come nested as the
 book prints them: ``C23 (C1 ax + S1 ay) + S23 az``.

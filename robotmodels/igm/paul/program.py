@@ -272,5 +272,5 @@ def _check(
     trial = table.trial()
     for e in sides:
         trial.expression(e)
-    price = float(sum(reached[max(level, 0)] for level, _, _ in trial.operations))
-    return price, sides
+    cost = float(sum(reached[max(level, 0)] for level, _, _ in trial.operations))
+    return cost, sides

@@ -60,7 +60,7 @@ class PlanText:
         if node.kind is not Kind.SUM or self.graph.is_constant(e):
             return e
         if e[1] not in self._short:
-            # the name stands for the sum with its first term positive
+            # the name denotes the sum with its first term positive
             sign = float(np.sign(e[0])) * (-1.0 if self.write(e).startswith("-") else 1.0)
             number = len(self._short) + 1
             name = self.graph.named(f"B{number}", f"B_{{{number}}}", (sign, e[1]))
@@ -149,14 +149,14 @@ class PlanText:
         return lines
 
     def _undetermined(self, step: Step) -> str:
-        """Where the step has no single answer, and what is done there."""
+        """Positions at which the step does not determine its unknown, and the value taken there."""
         first = f"${self.unknown(step.unknowns[0])}$"
         takes = f"there {first} takes the value of `q_ref` (0 without one) and counts once."
         if step.type is EquationType.TYPE_2_ZERO:
             where = " and ".join(map(self._vanishes, step.coefficients))
             which, meaning = self._which(step, first), self._meaning(step)
             return f"{which}{first} is free where {where}{meaning}: {takes}"
-        together = "The two solutions fall together where"
+        together = "The two solutions coincide where"
         if step.type in (EquationType.TYPE_2, EquationType.TYPE_6, EquationType.TYPE_7):
             elbow = " (stretched or folded)" * (step.type is not EquationType.TYPE_2)
             return (
@@ -190,7 +190,7 @@ class PlanText:
         return f"{first} has $S{frame} > 0$ and {turned} has $S{frame} < 0$. "
 
     def _meaning(self, step: Step) -> str:
-        """What it means for the arm that the amplitude of an equation vanishes."""
+        """Meaning for the arm of an equation whose amplitude vanishes."""
         if self.joints.unknowns[step.unknowns[0]].span is None:
             return ""
         j = self.joints.unknowns[step.unknowns[0]].terms[0][0]

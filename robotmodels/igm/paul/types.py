@@ -1,4 +1,4 @@
-"""The types of equations that Paul's method comes down to, and how each is solved on paper.
+"""The types of equations that Paul's method comes down to, and the formulas that solve each.
 
 `EquationType` is the table, one row for each type: name, equation (``formula``), most solutions
 (``branches``), rank among the types that are found (``rank``), function that prints the solution
@@ -26,7 +26,7 @@ _TWO = (2.0, ONE)
 
 @dataclass(slots=True)
 class Page:
-    """Symbols of one step, and its lines: the equations, what stands for what, what follows.
+    """Symbols and lines of one step: equations, definitions of symbols, formulas.
 
     ``words`` is the `PlanText` of the whole plan, ``formula`` that of the type.
     """

@@ -1,4 +1,4 @@
-"""LaTeX of explanations, made from their text, so that both say the same.
+"""LaTeX of explanations, made from their text, so that both have the same content.
 
 A line of an explanation is markup: words, with formulas between dollar signs. Its text is the
 markup without the signs. A formula is Python, whose syntax tree is written as LaTeX, a product of
