@@ -23,7 +23,7 @@ _ON = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Manipulability(Frozen, Value):
-    """How well joints move m components of the twist. Read-only.
+    """Manipulability of m components of the twist. Read-only.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How large a robot is, and configurations spread over its ranges.
+"""Characteristic lengths of a robot, and configurations spread over its joint ranges.
 
 Jacobians mix metres and radians. Where their rows are compared, linear ones are divided by a
 length of the robot: one for each frame, found once and kept.

@@ -29,14 +29,14 @@ class StaticStatus(Outcome):
 
     DETERMINED = 0, "One wrench balances the torques."
     UNDETERMINED = (
-        1, "Many wrenches balance the torques, as the structure carries some alone; the smallest.",
+        1, "Many wrenches balance the torques, as the structure carries some; the least is given.",
     )  # fmt: skip
     UNBALANCED = (
         2, "No wrench balances the torques: the residual would move joints while the tool rests.",
     )  # fmt: skip
     UNBALANCED_UNDETERMINED = (
         3, "No wrench balances the residual, which would move joints while the tool rests; many "
-        "balance the other torques, as the structure carries some alone; the smallest.",
+        "balance the other torques, as the structure carries some; the least is given.",
     )  # fmt: skip
 
 

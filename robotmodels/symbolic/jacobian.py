@@ -171,7 +171,7 @@ def _rotation(chain: PolynomialChain, i: int) -> Any:
 
 
 def _lever(chain: PolynomialChain, i: int, j: int) -> list[Any]:
-    """From the origin of node j to that of the frame, in the axes of i."""
+    """Vector from the origin of node j to that of the frame, in the axes of i."""
     if chain.is_short(i, j, TOOL):
         return formulas(chain.lever(i, j, TOOL), chain)
     return chain.nested_vector(i, j, chain.nested_position(j, TOOL))

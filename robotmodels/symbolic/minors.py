@@ -61,7 +61,7 @@ class Task(NamedTuple):
 def filled_entries(
     model: RobotModel, frame: str | int | None, pairs: Sequence[tuple[int, int]]
 ) -> dict[tuple[int, int], Pattern]:
-    """Where the third matrix (6, n) is not zero, for pairs of frames."""
+    """Nonzero entries of the third matrix (6, n), for pairs of frames."""
     q = random_postures(model, 4, seed=3)
     at_frame = model.twin.names.tool if frame is None else frame
     out = {}
@@ -73,7 +73,7 @@ def filled_entries(
 
 
 class Patterns:
-    """Where the third matrix is not zero, for every pair of frames on the path to a frame."""
+    """Nonzero entries of the third matrix, for every pair of frames on the path to a frame."""
 
     def __init__(self, model: RobotModel, frame: str | int | None, chain: Chain) -> None:
         frames = [0, *chain.path]

@@ -197,7 +197,7 @@ class Notation:
         repeated = sorted({name for name in final if final.count(name) > 1})
         if repeated:
             raise InvalidValueError(
-                f"symbols: {', '.join(map(repr, repeated))} would stand for two things; choose "
+                f"symbols: {', '.join(map(repr, repeated))} would denote two quantities; choose "
                 "names that are not in use."
             )
 

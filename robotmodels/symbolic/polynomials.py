@@ -51,14 +51,14 @@ class TrigRing:
         return p.as_expr().xreplace({symbol: root for root, symbol in self.roots.items()})
 
     def reduced(self, p: Poly) -> Poly:
-        """The same with every square of a sine written by the cosine."""
+        """The polynomial with every square of a sine written by the cosine."""
         for k, square in self._squares:
             if any(monomial[k] > 1 for monomial in p):
                 p = self.replaced(p, k, square)
         return p
 
     def replaced(self, p: Poly, k: int, square: Poly) -> Poly:
-        """The same with another form of the square of a generator."""
+        """The polynomial with another form of the square of a generator."""
         out = self.zero
         for monomial, coefficient in p.items():
             half, rest = divmod(monomial[k], 2)
@@ -96,7 +96,7 @@ class TrigRing:
         return [self.reduced(u[i] * v[k] - u[k] * v[i]) for i, k in PLANES]
 
     def determinant(self, M: Sequence[Sequence[Poly]], most_terms: int) -> Poly | None:
-        """By minors of the lower rows; None where an intermediate result has too many terms."""
+        """Determinant by minors of the lower rows; None if an intermediate result is too long."""
         minors: dict[tuple[int, ...], Poly] = {(): self.one}
         size = len(M)
         for row in range(size - 1, -1, -1):
@@ -263,7 +263,7 @@ class PolynomialChain(Chain):
         return [sum(x, self.ring.zero) for x in zip([self.ring.zero] * 3, *vectors, strict=True)]
 
     def cleaned(self, p: Poly) -> Poly:
-        """Without the terms whose constants cancel in numbers, as lengths of opposite sign may."""
+        """The polynomial without terms whose constants cancel, as lengths of opposite sign may."""
         ring = self.ring
         out = ring.zero
         for key, part in ring.collected(p, self.all_moving).items():

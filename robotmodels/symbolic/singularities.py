@@ -38,14 +38,14 @@ def explain_singularities(
     frame: str | int | None = None,
     symbols: Mapping[str, str] | None = None,
 ) -> SingularityExplanation:
-    """Where a robot is singular, as formulas: the factors of the determinant of its Jacobian.
+    """Singular positions of a robot as formulas: factors of the determinant of its Jacobian.
 
     Only the third of the three matrices of the book can be singular. Its projection and
     intermediate frames are those with the most zeros; rows and columns are rearranged to a block
     triangular form, so that the determinant is the product of small ones (for a spherical wrist
     those of arm and wrist), and these are factored as polynomials in sines and cosines.
 
-    What decides: for six joints the determinant of the Jacobian. For up to three joints the
+    The matrix that decides: for six joints the Jacobian. For up to three joints the rows of the
     position of the frame, if it has as many freedoms as they are (as by default in
     `classify_singularity`, `nearest_singularity` and `singularity_flags`); else the rows that are
     not zero, if they are as many as the joints (four of a SCARA arm); else all square minors. For

@@ -19,20 +19,20 @@ from .factor import SingularityFactor
 
 
 class FormulaStatus(Enum):
-    """How far the formulas go; the value is a sentence."""
+    """Completeness of the formulas; the value is a sentence."""
 
     FACTORED = "The determinant is the product of the factors."
-    NOT_FACTORED = "The determinant does not factor: it is given as the polynomial it is."
+    NOT_FACTORED = "The determinant does not factor: it is given as one polynomial."
     NOT_SOLVED = (
         "The determinant is the product of the factors, but one of them cannot be solved for a "
         "joint in closed form."
     )
     MINORS = (
-        "The matrix is not square: it loses rank where all its minors vanish, that is where every "
-        "factor of one of the conditions does."
+        "The matrix is not square: its rank is lower where all its minors vanish, that is, where "
+        "all factors of any one condition vanish."
     )
     TOO_LONG = (
-        "A determinant has too many terms to be written out; the factor that stands for it is "
+        "A determinant has too many terms to be written out; the factor in its place is "
         "computed from its matrix."
     )
     TOO_MANY_FAMILIES = (
@@ -40,8 +40,8 @@ class FormulaStatus(Enum):
         "followed."
     )
     NEVER_FULL_RANK = (
-        "The matrix has less than full rank in every position: some joints move the frame alike "
-        "wherever they stand."
+        "The matrix has less than full rank in every position: the velocities that the joints "
+        "give the frame are dependent everywhere."
     )
     TOO_MANY_JOINTS = "The robot has so many joints that its minors are too many to be written out."
     NO_JOINTS = "No joint moves the frame."

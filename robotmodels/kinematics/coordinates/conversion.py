@@ -163,7 +163,7 @@ def continuous_coordinates(
 
 
 def coordinates_of_poses(T: Array, kind: OrientationKind, near: Array | None) -> Array:
-    """`operational_coordinates` of what has been checked.
+    """`operational_coordinates` of checked poses.
 
     Shapes: T (..., 4, 4), near (..., m) -> (..., m).
     """

@@ -276,7 +276,7 @@ def _half_open(angle: Array) -> Array:
 
 
 def quaternions_near(Q: Array, near: Array) -> Array:
-    """Of each quaternion and its opposite, the one nearer to a given one.
+    """The nearer to a given quaternion of each quaternion and its opposite.
 
     Shapes: Q, near (..., 4) -> (..., 4).
     """

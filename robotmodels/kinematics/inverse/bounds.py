@@ -1,6 +1,6 @@
 """Limits of the joints as bounds of their velocities or accelerations at a configuration.
 
-What a joint may do now is what leaves it able to stop before its limit. With commands that are
+A joint may move as long as it can still stop before its limit. With commands that are
 held for a step h and a deceleration of at most A, a joint that starts with ``v = m A h + r``
 (m whole, 0 <= r < A h) needs ``A h^2 m (m + 1) / 2 + h (m + 1) r`` to stop, the step that it moves
 with v included. For small steps this is ``v^2 / (2 A)``.

@@ -1,4 +1,4 @@
-"""How singular positions are met: pseudo-inverse, filtered or damped singular values.
+"""Inverses of the Jacobian near singular positions: pseudo-inverse, filtered or damped.
 
 All of them solve ``A y = b`` with the Jacobian ``A`` and the twist ``b`` made comparable: linear
 rows divided by a characteristic length, columns by the square roots of the joints' weights. The
@@ -38,7 +38,7 @@ LARGEST_DAMPING = 0.0021
 
 
 class Damping(Enum):
-    """Which directions are damped, and when."""
+    """Choice of the damped directions."""
 
     WEAK_DIRECTIONS = "each direction whose singular value is below the threshold, by its own"
     SMALLEST_SINGULAR_VALUE = "all directions, by the smallest singular value"
@@ -66,7 +66,7 @@ class PseudoInverse:
 
     @property
     def gain(self) -> float:
-        """Without bound."""
+        """Infinite."""
         return inf
 
     @property
@@ -138,7 +138,7 @@ class DampedInverse:
 
     @property
     def gain(self) -> float:
-        """By the damping alone; infinite where that may vanish beside a singular position."""
+        """The gain by the damping; infinite where that may vanish beside a singular position."""
         if self.damping is Damping.MANIPULABILITY or self.largest == 0.0:
             return inf
         if self.damping is Damping.CONSTANT:

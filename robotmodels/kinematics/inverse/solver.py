@@ -1,4 +1,4 @@
-"""From a request to a solution: one compiled pass, and levels where tasks or limits are given."""
+"""Solution of a request: one compiled pass, or levels where tasks or limits are given."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ Secondary: TypeAlias = "ArrayLike | Criterion | Sequence[ArrayLike | Criterion]"
 _LARGEST = 1e100
 """Entries of a twist beyond which squares of them, and of what they need, may overflow."""
 _MOST_ROWS = 127
-"""What an int8 can count."""
+"""Largest count that fits int8."""
 _KEPT = 1.0 - 1e-9
 """Scale of the twist below which limits have slowed it, but for rounding."""
 _SAMPLES, _RANK = 24, 1e-10
@@ -87,7 +87,7 @@ def _scaling(
 
 
 def _usual_scaling(model: RobotModel, frame: str | int | None) -> Scaling:
-    """That of a call without mask, weights and length."""
+    """Scaling of a call without mask, weights and length."""
     key = model.twin.frame(frame).pin_id
     return _SCALINGS(model, key, lambda: _scaling(model, frame))
 

@@ -137,7 +137,7 @@ class Task(Rebuilt):
 
 
 def _remembered(builder: Callable[..., Task]) -> Callable[..., Task]:
-    """Builder whose tasks know how they were made, so that copies and pickles make them again."""
+    """Builder whose tasks keep its arguments, from which copies and pickles are rebuilt."""
 
     @wraps(builder)
     def build(*arguments: Any, **options: Any) -> Task:

@@ -1,4 +1,4 @@
-"""What happens in an arm where it is singular: axes aligned, points on axes or in planes.
+"""Geometric conditions of singular positions: axes aligned, points on axes or in planes.
 
 One list of events names singular positions for the formulas, which look at configurations that
 make a factor vanish, and for the numbers, which look around one configuration.
@@ -24,14 +24,14 @@ _STRETCHED = "the arm is stretched or folded"
 
 
 class SingularityKind(Enum):
-    """Where in an arm a singular position arises.
+    """Part of an arm in which a singular position arises.
 
     The geometry on the zeros of the factor decides: SHOULDER where the wrist centre comes to the
     first axis (or into the plane through it that is parallel to the second axis), or two of the
     first three axes are aligned; ELBOW where the arm is stretched or folded (neighbouring parallel
     axes and the wrist centre, or three parallel axes, come into one plane, or two axes in the
     middle are aligned); WRIST where two of the last three axes are aligned or parallel. Where
-    nothing of that happens, a factor in the variables of the last three (first three) of six or
+    none of these holds, a factor in the variables of the last three (first three) of six or
     more joints alone is WRIST (SHOULDER), any other is OTHER.
     """
 
@@ -65,7 +65,7 @@ class Event(NamedTuple):
     places: tuple[int, ...]
 
     def happens(self, scene: _Scene) -> bool:
-        """Whether it does so in all configurations of a scene."""
+        """Whether it holds in all configurations of a scene."""
         return _none(self.residual(scene, *self.places))
 
 
@@ -104,12 +104,12 @@ class ArmGeometry:
         return scene if self.meeting is None else scene._replace(W=_common(scene, *self.meeting))
 
     def event(self, q: Array) -> Event | None:
-        """What all configurations of q (samples, n) have in common and others have not."""
+        """Condition that holds in all configurations of q (samples, n) and not in others."""
         scene = self._scene(q)
         return next((event for event in self.events if event.happens(scene)), None)
 
     def residuals(self, event: Event, q: Array) -> Array:
-        """How far configurations (samples, n) are from an event, (samples, r), without units."""
+        """Residuals (samples, r) of an event in configurations (samples, n), without units."""
         found = event.residual(self._scene(q), *event.places).reshape(len(q), -1)
         return np.where(np.isnan(found), np.inf, found)
 
@@ -155,7 +155,7 @@ class ArmGeometry:
         return SingularityKind.SHOULDER if b <= 2 else SingularityKind.ELBOW
 
     def kind_of_joints(self, numbers: tuple[int, ...]) -> SingularityKind:
-        """By the joints alone, for a factor without an event."""
+        """Kind by the joints alone, for a factor without an event."""
         kind = SingularityKind.OTHER
         if self.whole_arm:
             places = [self.numbers.index(k) for k in numbers]

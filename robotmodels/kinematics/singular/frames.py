@@ -1,8 +1,8 @@
-"""Lost directions where they are simplest: in whose axes, and at which point.
+"""Frames in which the lost directions are simplest: their axes, and their point.
 
-A wrench that no motor feels has other components at another point, and so has the combination of
-velocities that cannot be produced. In the right frame most of them are zero; the book finds that
-frame by choosing the projection and the intermediate frame of the Jacobian.
+A wrench that is balanced without motor torques has other components at another point, and so has
+the combination of velocities that cannot be produced. In the right frame most of them are zero; the
+book finds that frame by choosing the projection and the intermediate frame of the Jacobian.
 """
 
 from __future__ import annotations

@@ -98,7 +98,7 @@ def names_near(
 
 
 def _ordered(sets: list[SingularSet]) -> tuple[Name, ...]:
-    """Their names, each once, from the shoulder to the wrist."""
+    """Names of the sets, each once, from the shoulder to the wrist."""
     order = list(SingularityKind)
     events = dict.fromkeys(event for s in sets for event in s.events)
     names = sorted(events, key=lambda event: order.index(event[0]))
@@ -111,7 +111,7 @@ def _zero(tolerance: float) -> float:
 
 
 def _minimal(arm: ArmGeometry, made: list[tuple[SingularSet, Array]]) -> tuple[SingularSet, ...]:
-    """Those that are not where others meet, each once, the nearest first."""
+    """Sets that are not intersections of other sets, each once, the nearest first."""
     found: dict[tuple[Name, ...], SingularSet] = {}
     for cause, residual in sorted(made, key=_specialty):
         here = {arm.events[k].sentence for k in np.flatnonzero(residual <= _LOOSE)}
@@ -173,7 +173,7 @@ def _span(rows: Array, least: float) -> Array:
 
 
 def _gradient(space: SearchSpace, arm: ArmGeometry, event: Event, x: Array) -> Array:
-    """Derivatives (r, n) of what is zero where an event happens, per unit of distance."""
+    """Derivatives (r, n) of the residuals of an event, per unit of distance."""
     shifts = _STEP * np.eye(len(x))
     points = np.concatenate([x + shifts, x - shifts]) * space.unit
     values = arm.residuals(event, points)

@@ -124,7 +124,7 @@ class NearestSingularities(Rebuilt):
         return NearestStatus(int(self.status[i])).sentence
 
     def __str__(self) -> str:
-        """Table of what was found, and what the kinds mean below it."""
+        """Table of the configurations that were found, and the meaning of the kinds below it."""
         lines = [self.outcome.sentence, *counting_lines(self.mask, self.frame)]
         if not self.count:
             return "\n".join(lines)
@@ -217,7 +217,7 @@ def nearest_singularity(
 def _with_crossings(
     space: SearchSpace, first: Array, found: FoundPoints, rows: list[int], limits: bool, most: int
 ) -> tuple[FoundPoints, list[int]]:
-    """Also the other sets that meet the one on which the given configuration is.
+    """The points, and those of other sets that meet the set of the given configuration.
 
     Their nearest points are likely to be where they meet it, and there they have no tangent.
     Seen from a little beside the set they are ordinary.
@@ -254,7 +254,7 @@ def _distinct(space: SearchSpace, found: FoundPoints, limits: bool, most: int) -
     turning = model.table.sigma[model.table.joint_rows] != PRISMATIC
     turn = np.where(turning, 2.0 * pi / space.unit, np.inf)
     distance = np.linalg.norm(found.x - space.start, axis=1)
-    # converged ones come first among equals, so that a stray copy does not stand for them
+    # converged ones come first among equals, so that an inaccurate copy does not replace them
     order = np.lexsort((found.tangential, distance.round(6)))
     kept: list[int] = []
     for i in order:
@@ -272,10 +272,10 @@ def _distinct(space: SearchSpace, found: FoundPoints, limits: bool, most: int) -
 
 
 def _confirmed(space: SearchSpace, found: FoundPoints, limits: bool, most: int) -> FoundPoints:
-    """Only the points to which starts beside them come back.
+    """The points to which starts beside them converge.
 
     Where two sets cross, neither has a tangent and the gradients vanish, so that the conditions
-    of a nearest point say nothing: starts beside such a point slide away along one of them.
+    of a nearest point hold trivially: starts beside such a point move away along one of them.
     """
     rows = _distinct(space, found, limits, most)
     n = found.x.shape[1]
@@ -299,7 +299,7 @@ def _picked(found: FoundPoints, keep: NDArray[np.bool_]) -> FoundPoints:
 def _result(
     space: SearchSpace, start: Array, found: FoundPoints | None, rows: list[int]
 ) -> NearestSingularities:
-    """Names and statuses; what is not stationary is kept only where it stands for a kind alone."""
+    """Names and statuses; a point that is not stationary is kept only if its kind has no other."""
     task, n = space.task, len(start)
     if found is None:
         none, number = np.zeros((0, n)), np.zeros(0)

@@ -1,4 +1,4 @@
-"""Rank of the Jacobian and dimension of the operational space: what a robot can do at all.
+"""Rank of the Jacobian and dimension of the operational space of a robot.
 
 Book section 1.3.1.4. The number of degrees of freedom of the tool is the rank of its
 Jacobian: the local one at a configuration, the global one M at almost all of them.
@@ -254,7 +254,7 @@ def _greatest_rank(J: Array, tolerance: float) -> int:
 
 
 def _never(task: SingularTask, q: Array, own: bool, tolerance: float) -> Array:
-    """What is orthogonal to the columns of the Jacobians of all configurations at once."""
+    """Directions orthogonal to the columns of the Jacobians of all configurations."""
     if not task.is_whole and own is not (task.mask_axes == "tool"):
         return np.zeros((0, 6))  # the components that count turn in these axes
     J = jacobian(task.model, q, task.frame, "local" if own else "world_aligned")

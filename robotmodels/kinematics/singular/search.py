@@ -38,7 +38,7 @@ class SearchSpace:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundPoints:
-    """Where a search ended. N points.
+    """End points of a search, N of them.
 
     Shapes: x, escape, held (N, n); weakest, tangential, slope, codimension (N,).
     """
@@ -201,7 +201,7 @@ def _polished(space: SearchSpace, x: Array) -> Array:
 
 
 def _conditions(space: SearchSpace, x: Array, held: NDArray[np.bool_]) -> Array:
-    """What must vanish, (N, n): the difference to the start along the set plus the step to it."""
+    """Conditions (N, n): difference to the start along the set plus the step to it, both zero."""
     S, _, G = on_set(space, x)
     G = np.where(held[:, None], 0.0, G)
     U, size, Vt = np.linalg.svd(G, full_matrices=False)

@@ -2,7 +2,7 @@
 
 A velocity v of the null space, ``J v = 0``, continues to a motion that keeps the pose of the tool
 only if the second order allows it: ``u^T (dJ/dt) v = 0`` for every lost direction u, ``J^T u = 0``.
-The same form tells on which side of a singular pose the tool can move along u.
+The same form gives the side of a singular pose to which the tool can move along u.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _MET = 1e-11
 class SelfMotionKind(Outcome):
     """Extent of a self-motion; each member has a ``sentence``."""
 
-    FINITE = 0, "The joints can move on while the tool stays."
+    FINITE = 0, "The joints can move by a finite amount while the tool stays at rest."
     INFINITESIMAL = (
         1, "The joints can only begin to move: at the second order the tool leaves its place.",
     )  # fmt: skip
