@@ -4,19 +4,19 @@ Parameters
 ----------
 arm, limits, free, mask, executor, progress
     See `robotmodels.performance`; of one component of the orientation 180 angles about its axis,
-    from the orientation of zero joints, stand for every one.
+    from the orientation of zero joints, represent all of them.
 T : array_like, shape (..., 4, 4)
     World poses of the tool.
 level : {"position", "pose", "every_orientation"}
-    What is requested: the position in any orientation, the pose, or the position in every
-    orientation, of which 96 stand for all (180 angles for an arm that moves in a plane).
+    The request: the position in any orientation, the pose, or the position in every
+    orientation, of which 96 represent all (180 angles for an arm that moves in a plane).
 
 Returns
 -------
 Accessibility
     Of each pose ``status`` (...), codes of `AccessStatus`, and ``count`` (...), the postures within
     the limits and free of collisions; of several orientations the least, of an infinite family
-    the members that were found. ``level`` as asked.
+    the members that were found. ``level`` as requested.
 
 Examples
 --------

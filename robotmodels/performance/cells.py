@@ -65,7 +65,7 @@ class Space:
         return np.allclose(self.frame, arm.frame, rtol=0.0, atol=1e-9 * max(arm.size, 1.0))
 
     def turning_axis(self, joints: JointSpace) -> Array | None:
-        """Where the first axis (2,) stands across a plane if it turns freely."""
+        """Point (2,) at which the first axis crosses a plane, if it turns freely."""
         chain = joint_chain(joints.model)
         D, first = joints.model.base @ chain.D[0], chain.columns[0]
         across = self.kind == "plane" and abs(D[:3, 2] @ self.frame[:3, 2]) > 1.0 - 1e-12
@@ -140,7 +140,7 @@ def space_of(
     )
     if section == "plane" and not (circle and turned):
         raise InvalidValueError(
-            f"section: {model.name} has no plane that stands for its workspace: its first joint "
+            f"section: {model.name} has no plane that represents its workspace: its first joint "
             "does not turn freely, or obstacles or an orientation are not symmetric about its "
             "axis; use section='space'."
         )
@@ -200,7 +200,7 @@ def reached_cells(joints: JointSpace, cells: Cells, work: Workers) -> Flags:
     at, inside = cells.numbers(points)
     q_of[at] = q[inside]
     hit = np.asarray(np.isfinite(q_of).all(axis=1))
-    # a sample in a cell says nothing of its centre where the border passes
+    # a sample in a cell does not decide about its centre where the border passes
     inner = ~neighbours(~hit.reshape(shape)).ravel()
     reached, tried = inner.copy(), inner.copy()
     move = partial(_moved_to, _bounded(joints), cells)

@@ -1,6 +1,6 @@
 """Singular curves of three-joint arms, their cusps and nodes: sections 3.3.6, 3.4.2 and 3.4.4.
 
-The position of the arm is determined by three joints, or two in a plane. What is found is the same
+The position of the arm is determined by three joints, or two in a plane. The results are the same
 for all values of the first joint: the section is half a plane through its axis, or a plane across
 it if it slides; for a planar arm of two joints its plane. At a cusp three postures meet: the
 singular curve in joint space is tangent to the direction in which the arm moves without moving its

@@ -262,10 +262,10 @@ def _signs_are_labels(factors: Factors, q: Array, labels: NDArray[np.str_]) -> b
         return False
     signs = np.where(np.array([*map(list, ends)]) == "+", 1, -1)
     own = np.where(factors.values(q) > 0.0, 1, -1)
-    # a label that is the same in all postures tells nothing and needs no factor
-    told = np.ptp(signs, axis=0) > 0
-    products = signs[:, told].T @ own / len(own)
-    return bool((np.abs(products).max(axis=1, initial=0.0) == 1.0).all()) and bool(told.any())
+    # a label that is the same in all postures needs no factor
+    varying = np.ptp(signs, axis=0) > 0
+    products = signs[:, varying].T @ own / len(own)
+    return bool((np.abs(products).max(axis=1, initial=0.0) == 1.0).all()) and bool(varying.any())
 
 
 def _most_regular(

@@ -54,7 +54,7 @@ class _Arc(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LevelSet:
-    """Where the determinant of an arm has a level: ends (2, 2) of the ranges, whole circles (2,).
+    """Level set of the determinant of an arm: ends (2, 2) of the ranges, whole circles (2,).
 
     ``roots`` are the values of x3 at which it has the level for all x2; A, B, C are without them.
     """
@@ -67,7 +67,7 @@ class LevelSet:
 
     @property
     def unit(self) -> Array:
-        """What counts as a radian of each joint: a radian, or a part of the range of a slide."""
+        """Unit of each joint: a radian, or a part of the range of a slide."""
         return np.where(self.arm.turns, 1.0, np.ptp(self.ends, axis=1) / tau)
 
     def curves(self, step: float = STEP) -> tuple[list[Line], bool]:
@@ -218,7 +218,7 @@ class LevelSet:
 
 
 def level_set(model: RobotModel, arm: SectionArm, limits: bool, level: float = 0.0) -> LevelSet:
-    """Where the determinant has a level."""
+    """Level set of the determinant."""
     ranges, circle = JointSpace(model, limits).ranges(arm.columns[1:])
     return LevelSet(arm, ranges[arm.columns[1:]], circle[arm.columns[1:]], level)
 

@@ -7,7 +7,7 @@ Parameters
 ----------
 arm, limits, mask
     See `robotmodels.performance`; whole turns are added so that as much as possible of the path
-    lies within the limits, and three joints are asked for the position by default.
+    lies within the limits, and by default the position alone counts for three joints.
 poses : array_like, shape (N, 4, 4)
     World poses of the tool.
 through_singular : bool
@@ -190,11 +190,11 @@ def _best(arm: RobotModel, U: Array, breaks: Ints, rows: Flags, cost: str) -> in
     chosen = np.flatnonzero(breaks == last)
     part = U[:last, chosen]
     if cost == "length":
-        price = np.linalg.norm(np.diff(part, axis=0), axis=2).sum(axis=0)
+        total = np.linalg.norm(np.diff(part, axis=0), axis=2).sum(axis=0)
     else:
         least = bound_of(arm, rows).least(part.reshape(-1, arm.n)).reshape(last, -1)
-        price = (1.0 / np.maximum(least, 1e-12)).mean(axis=0)
-    return int(chosen[price.argmin()])
+        total = (1.0 / np.maximum(least, 1e-12)).mean(axis=0)
+    return int(chosen[total.argmin()])
 
 
 # --- continuation of postures: Newton steps along the motion between two poses --------------------

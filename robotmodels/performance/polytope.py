@@ -1,4 +1,4 @@
-"""Polytopes of velocities, forces and accelerations (section 3.6.2): what limits of joints leave.
+"""Polytopes of velocities, forces and accelerations within joint limits (section 3.6.2).
 
 Velocities are the images of the box of joint velocities, a zonotope; accelerations, at rest and
 without gravity, those of the box of torques; forces are all that torques in their box balance, an

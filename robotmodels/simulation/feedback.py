@@ -126,7 +126,7 @@ def _snapped(times: Array, near: Array, tolerance: float) -> Array:
 
 
 def stateful(control: StatefulControl, n: int) -> Feedback:
-    """Feedback by a law with a state; its answers are checked."""
+    """Feedback by a law with a state; its results are checked."""
     state0 = as_core(control.state0, (), "control.state0")
     if state0.ndim != 1:
         raise ShapeError(f"control.state0: expected shape (k,), got {state0.shape}.")

@@ -107,7 +107,7 @@ def simulate(
     SingularMassMatrixError, InertiaError
         A mass matrix that is singular or not positive definite at the start.
     ShapeError, InvalidValueError
-        Arguments, or answers of laws, of the wrong shape, with NaN or infinity; a start outside the
+        Arguments, or results of laws, of the wrong shape, with NaN or infinity; a start outside the
         limits, or too fast; negative dry friction; joints that mimic others; a delay without a
         period, or as long as the simulation.
 
@@ -190,7 +190,7 @@ def followed(
 def law_of(law: Any, size: int, t: Array | None, name: str) -> tuple[Any, Array]:
     """Function of time and state -> (size,) of one, of constants or of rows; times of its kinks.
 
-    None for None. The answers of a user's function are checked.
+    None for None. The results of a user's function are checked.
     """
     none = np.empty(0)
     if law is None or callable(law):

@@ -120,7 +120,7 @@ class Candidates:
         return Evaluated(cost, T, self.violation(points[0], self.margin))
 
     def violation(self, q: Array, margin: float = 0.0) -> float:
-        """How far postures (N, n) are outside of the limits of position and the clearance."""
+        """Violation of the limits of position and of the clearance by postures (N, n)."""
         limits = self.limits.limits
         over = np.maximum(q - limits.upper, limits.lower - q).max(initial=-np.inf)
         over = max(float(over) + margin, 0.0)
@@ -239,7 +239,7 @@ def random_profile(
     ends, scalar = joint_vectors(q0=q0, q1=q1)
     start, end = ends["q0"], ends["q1"]
     if not np.any(start != end):
-        raise InvalidValueError("q0, q1: the ends are the same, so there is no way between them.")
+        raise InvalidValueError("q0, q1: the ends are the same, so there is no path between them.")
     points = start + np.linspace(0.0, 1.0, count + 2)[:, None] * (end - start)
     points[1:-1] += half_width(start, end) * generator.uniform(-1.0, 1.0, (count, start.size))
     given = points[:, 0] if scalar else points
@@ -257,6 +257,6 @@ def random_profile(
 
 
 def half_width(start: Array, end: Array) -> Array:
-    """How far nodes are drawn from the straight line (n,)."""
+    """Largest distance of drawn nodes from the straight line (n,)."""
     way = np.abs(end - start)
     return np.maximum(0.5 * way, 0.1 * way.max())

@@ -44,7 +44,7 @@ from .trajectory import Trajectory
 _MOVES = ("translation", "rotation")
 
 _NO_TURN = 1e-15
-"""What rounding leaves of no rotation between two equal orientations, rad."""
+"""Rounding of the angle between two equal orientations, rad."""
 
 _FLAT = 1e-9
 """Height of three points beside their longest side below which they are on a line. Down to it an
@@ -170,7 +170,7 @@ def circle(
     n = direction / size
     foot = point + n * (n @ (first[:3, 3] - point))
     if np.linalg.norm(first[:3, 3] - foot) <= 1e-12 * max(1.0, float(np.abs(first[:3, 3]).max())):
-        raise InvalidValueError("T0: the pose stands on the axis, so its circle has no radius.")
+        raise InvalidValueError("T0: its origin is on the axis, so that the circle has no radius.")
     sweep = as_number(angle, "angle")
     last = first.copy()
     R = rotation_about(n, np.array(sweep))
@@ -279,7 +279,7 @@ def _of_space(limits: MotionLimits | None) -> MotionLimits | None:
         )
     bounds = limits.for_joints(2)
     if any((least != -most).any() for _, least, most in ranges_of(bounds)[1:]):
-        raise InvalidValueError("limits: those of a path in space are lengths, alike both ways.")
+        raise InvalidValueError("limits: a path in space needs limits equal in both directions.")
     if np.isfinite(bounds.lower).any() or np.isfinite(bounds.upper).any():
         raise InvalidValueError("limits: a path in space has no limits of position.")
     return bounds

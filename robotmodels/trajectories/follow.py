@@ -1,4 +1,4 @@
-"""Which of the postures of every pose belong together."""
+"""Choice of one posture for each pose, such that the motion is continuous."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From poses of the tool to joints: one posture after the other, without leaving its branch."""
+"""Joint path along poses of the tool: one posture after the other, on one branch."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .trajectory import Sampled
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointPath(Sampled):
-    """Postures that follow poses, and what happens on the way.
+    """Postures that follow poses, and the events along the path.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class JointPath(Sampled):
     branch : ndarray of str, shape (N,)
         Labels of the branches; empty where a redundant arm went on by steps.
     events : tuple of PathEvent
-        What happens, in the order of the path.
+        Events, in the order of the path.
     """
 
     t: Array
@@ -83,7 +83,7 @@ def joint_path(
     orientation_tolerance: float = 1e-9,
     singular_below: float = 0.002,
 ) -> JointPath:
-    """Joint positions along poses, branch kept, with a report of what happens on the way.
+    """Joint positions along poses, branch kept, with a report of the events along the path.
 
     Also called ``ikine`` of a ``ctraj``. Each pose is solved for all postures, and the nearest to
     the last one is taken. Without ``q_start`` the branch is chosen with the fewest jumps, the
@@ -100,7 +100,7 @@ def joint_path(
     q_near : array_like, shape (n,), optional
         A guess instead: the path begins with the solution of the first pose that is nearest to it.
     samples : int
-        Into how many poses a `PoseTrajectory` is divided.
+        Number of poses into which a `PoseTrajectory` is divided.
     mask, mask_axes, position_tolerance, orientation_tolerance
         As in `igm`.
     singular_below : float

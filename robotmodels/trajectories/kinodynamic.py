@@ -40,7 +40,7 @@ _QUICKEST = Cost()
 
 
 class Timing(Enum):
-    """How a candidate of the planner is timed; the value says how."""
+    """Timing of a candidate of the planner; the value describes it."""
 
     OPTIMAL = "the quickest motion along its path"
     PROFILE = "its own profile over time, evenly stretched to the least duration"
@@ -192,7 +192,7 @@ def kinodynamic(
                 return _without(
                     PlanStatus.ENDS_IN_COLLISION if end else PlanStatus.NONE_FOUND,
                     f"The clearance at {name} is {distance[0]:.4g} m, less than the {wanted:.4g} m "
-                    "asked for.",
+                    "requested.",
                 )
             q = q[distance >= wanted]
         postures[k] = q

@@ -30,7 +30,7 @@ _BACK = np.array([[-1, 0, 0, 0], [-1, 1, 0, 0], [-1, 2, -1, 0], [-1, 3, -3, 1.0]
 
 
 class TimeLaw(Enum):
-    """How the motion is distributed over its time; the value describes the law."""
+    """Laws of time of a motion; the value describes the law."""
 
     LINEAR = "constant velocity: starts and stops with a jump of velocity"
     CUBIC = "third-order polynomial: starts and stops with a jump of acceleration"

@@ -117,7 +117,7 @@ def ranges_of(limits: MotionLimits) -> tuple[tuple[str, Array, Array], ...]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LimitsReport(Value):
-    """What a motion asks of each joint, beside what is allowed.
+    """Extremes of the motion of each joint, beside its limits.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ class LimitsReport(Value):
 
     @property
     def stretch(self) -> float:
-        """By how much the motion must be slowed down to keep its limits; at most 1 if it does.
+        """Factor by which the motion must be slowed down to keep its limits; at most 1 if it does.
 
         Duration times this keeps velocity, acceleration and jerk. Positions are not touched.
         """
@@ -221,7 +221,7 @@ def limits_along(limits: MotionLimits, u: Array, names: tuple[str, ...] = ()) ->
     if zero.any():
         i, j = (int(k) for k in np.argwhere(zero)[0])
         what = names[j] if names else f"joint {j + 1}"
-        raise InvalidValueError(f"limits: that of {RATES[i // 2]} of {what}, which moves, is 0.")
+        raise InvalidValueError(f"limits: {what} moves, and its limit of {RATES[i // 2]} is 0.")
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         bounds = np.where(u != 0.0, bounds / np.abs(u), np.inf)
     V, back, A, B, J, K = bounds.min(axis=-1).tolist()
@@ -244,7 +244,7 @@ def checked_limits(limits: MotionLimits | None, n: int, *postures: Array) -> Mot
         if outside.any():
             j = int(np.argwhere(outside)[0][-1])
             raise InvalidValueError(
-                f"Joint {j + 1} is asked to be at {q[outside].ravel()[0]:.6g}, outside its limits "
+                f"Joint {j + 1} is at {q[outside].ravel()[0]:.6g}, outside its limits "
                 f"{limits.lower[j]:.6g} to {limits.upper[j]:.6g}."
             )
     return limits

@@ -31,24 +31,24 @@ _FAR = 0.5 * np.pi
 
 
 class PathEventKind(Enum):
-    """What may happen on the way; the value is the sentence a person reads."""
+    """Kinds of events along a path; the value is a sentence."""
 
     OUT_OF_REACH = "The path leaves the reach of the robot."
     OUTSIDE_LIMITS = "The posture is outside the joint limits."
     SINGULAR = "The path meets a singular position."
     CHANGES_POSTURE = "The posture changes its branch."
-    JUMP = "The posture does not go on: the joints would have to jump."
-    TOO_FAST = "The joints would have to be faster than they can."
+    JUMP = "The posture cannot be continued: the joints would have to jump."
+    TOO_FAST = "The joints would exceed their velocity limits."
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathEvent(Value):
-    """Something that happens on a run of poses.
+    """An event on a run of poses.
 
     Parameters
     ----------
     kind : PathEventKind
-        What.
+        Its kind.
     first, last : int
         Numbers of the first and the last pose of the run.
     start, stop : float
@@ -114,7 +114,7 @@ class Task:
         return (mean @ self._rows(move, T)[..., None])[..., 0]
 
     def _rows(self, twists: Array, T: Array) -> Array:
-        """The components asked for, positions in units of the lever."""
+        """The requested components, positions in units of the lever."""
         twists = np.array(twists)
         if self._tool:
             axes = np.swapaxes(T[:, :3, :3], -1, -2)

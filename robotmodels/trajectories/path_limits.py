@@ -281,9 +281,7 @@ def checked_torque(
     """Greatest torques (n,), infinite where there is no limit; by default those of the table."""
     if model is None:
         if torque is not None:
-            raise InvalidValueError(
-                f"{name}: limits of torque need model=, whose torques they are."
-            )
+            raise InvalidValueError(f"{name}: limits of torque need the robot, model=.")
         return np.full(n, np.inf)
     check_model(model)
     if model.n != n:

@@ -37,7 +37,7 @@ _NARROW = 0.1  # of the first steps: the last ones
 
 
 class PlanMethod(Enum):
-    """How the planner searches; the value says how."""
+    """Method of the search; the value describes it."""
 
     ANNEAL = "simulated annealing of the nodes, then local improvement"
     DESCENT = "local improvement of the straight path and of random ones"

@@ -38,7 +38,7 @@ from .trajectory import Samples, Trajectory
 
 
 class Synchronisation(Enum):
-    """How joints that move together are kept in step; the value says what is common to them."""
+    """Synchronisation of joints that move together; the value describes what they share."""
 
     COORDINATED = "one law: the ratio of the joints' motions is kept along the whole path"
     SAME_TIME = (

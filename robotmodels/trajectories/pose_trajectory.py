@@ -229,7 +229,7 @@ def arc(
 
 
 def rotation_about(axis: Array, angle: Array) -> Array:
-    """Rotations by an angle about a unit axis (Rodrigues' formula, seed eq. [1.9])."""
+    """Rotations by an angle about a unit axis (Rodrigues' formula)."""
     K = skew(axis)
     angle = np.asarray(angle, dtype=np.float64)[..., None, None]
     # 1 - cos by the half angle, which keeps its digits at small angles

@@ -40,7 +40,7 @@ class ResolvedMotion(Sampled):
     status : ndarray of int8, shape (N,)
         Codes of `IKMStatus`.
     position_error, orientation_error : ndarray, shape (N,)
-        How far the tool is behind in what was asked for, m and rad.
+        Errors of the tool in the requested components, m and rad.
     """
 
     t: Array
@@ -68,9 +68,9 @@ def resolved_motion(
     """Follow a trajectory of the tool by joint velocities.
 
     Also called resolved motion rate control, closed-loop inverse kinematics, ``rrmc``. Each step
-    takes the velocity of `ikm` half a step ahead plus ``feedback`` times what the tool is behind:
-    the error falls with the square of the step. With ``limits`` it is taken where the joints are,
-    so that no bound is passed, and the error falls with the step.
+    takes the velocity of `ikm` half a step ahead plus ``feedback`` times the error of the tool,
+    which decreases with the square of the step. With ``limits`` it is taken where the joints are,
+    so that no bound is passed, and the error decreases with the step.
 
     Parameters
     ----------

@@ -42,12 +42,12 @@ _ROUNDED = 1e-14  # relative excess that rounding alone makes
 
 
 class SplineEnds(Enum):
-    """What is asked of a cubic spline at its ends."""
+    """End conditions of a cubic spline."""
 
     CLAMPED = "given velocities at the ends"
     NATURAL = "no acceleration at the ends"
     NOT_A_KNOT = "one polynomial on the first two intervals, and one on the last two"
-    PERIODIC = "velocity and acceleration go on from the last point at the first"
+    PERIODIC = "velocity and acceleration at the last point equal those at the first"
 
 
 def cubic_spline(

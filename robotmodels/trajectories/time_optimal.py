@@ -231,7 +231,7 @@ def _uses(problem: PathLimits, motion: Motion, law: PiecewisePolynomial, both_en
 
 
 def _beyond(use: Array, s: Array, both_ends: bool) -> str:
-    """Where torques inside of intervals exceed their limits, as a sentence, or nothing."""
+    """Sentence on torques that exceed their limits inside of intervals; empty if none do."""
     size = np.abs(use).max(axis=1, initial=0.0)
     if not size.max(initial=0.0) > _BETWEEN:
         return ""
@@ -259,7 +259,7 @@ def _without(status: TimingStatus, why: str) -> TimedPath:
 
 
 def _where(passes: Passes, s: Array, ends: tuple[float, float]) -> str:
-    """Why the end is not reached, as a sentence."""
+    """Sentence on the reason why the end is not reached."""
     i, rate = passes.failed, passes.found[:, 0]
     if i < 0:
         i = int(((rate[1:] <= 0.0) & (rate[:-1] <= 0.0)).argmax())

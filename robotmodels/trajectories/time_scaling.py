@@ -1,6 +1,6 @@
 """Least duration of a motion that keeps its profile: windows of the duration at every sample.
 
-Stretched evenly to the duration T, a profile asks for the torques ``A / T^2 + B / T + C``: A of
+Stretched evenly to the duration T, a profile needs the torques ``A / T^2 + B / T + C``: A of
 inertia, Coriolis and centrifugal effects, B of viscous friction, C of gravity, offsets and dry
 friction (book section 4.4.2.3). Each limit forbids intervals of ``z = 1 / T``.
 """
@@ -101,9 +101,7 @@ def time_scaled(
     if not np.any(motion.extremes(1)):
         raise InvalidValueError("trajectory: it does not move, so it has no least duration.")
     if not (np.isfinite(bound).any() or least > 0.0):
-        raise InvalidValueError(
-            "limits, torque: all are infinite or the motion is none, so any duration keeps them."
-        )
+        raise InvalidValueError("limits, torque: all are infinite, so any duration keeps them.")
     fraction = np.linspace(0.0, 1.0, _FINE)
     parts = torque_parts(problem, motion, fraction)
     fraction, (A, B, C) = fraction[::_SHOWN], (part[::_SHOWN] for part in parts)

@@ -202,7 +202,7 @@ class Trajectory(Value):
                 if not self.holds and beyond.any() and self._moving(np.array([edge])):
                     raise InvalidValueError(
                         f"t: {float(flat[beyond][0]):g} s is {side} of a motion of {end:g} s that "
-                        "does not rest there; ask for times inside it."
+                        "does not rest there; give times inside it."
                     )
             flat, outside = np.clip(flat, 0.0, end), before | after
         values = self.motion.derivatives(flat, orders)

@@ -66,7 +66,7 @@ MUTATIONS = [
     fault("breaks counted from one", "ends[alive] = k", "+ 2", "+ 3", PATHS + "line_breaks"),
     fault("whole turns the wrong way", "least = np.ceil((lower", "- low", "+ low",
           PATHS + "whole_turns"),
-    fault("the longest motion is the best", "return int(chosen[price", "argmin", "argmax",
+    fault("the longest motion is the best", "return int(chosen[total", "argmin", "argmax",
           PATHS + "least_cost"),
     fault("accessible outside the limits", "free = free_of(", "space, q, valid & inside",
           "space, q, valid", SECTIONS + "says_why"),
