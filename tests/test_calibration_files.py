@@ -135,7 +135,7 @@ def test_distances_and_relative_poses(tmp_path):
     more = {"joints": NUMBERS, "columns": range(12, 18), "orientation": "rpy_urdf"}
     found = read_measurements(file, RelativePose, RX90, other_joints=range(6, 12), **more)
     np.testing.assert_allclose(found.T, between, atol=1e-10)
-    with pytest.raises(InvalidValueError, match="two ends need two readings"):
+    with pytest.raises(InvalidValueError, match="two measured ends need the readings"):
         read_measurements(file, RelativePose, RX90, **more)
 
 

@@ -67,7 +67,7 @@ def selected(kind, count, **options):
         (r"T: expected shape \(4, 4, 4\)", lambda: CameraPose(Q4, STILL[:2])),
         ("^T: ", lambda: RelativePose(Q4, Q4, 2 * STILL)),
         ("rows: expected 6 numbers", lambda: Pose(Q4, STILL, rows=[0] * 6)),
-        ("another end than 'a'", lambda: LinkedFrames(Q4, "a", "a")),
+        ("an end other than 'a'", lambda: LinkedFrames(Q4, "a", "a")),
         ("a positive length", lambda: KnownDistance("a", "b", -1.0)),
         ("positive definite", lambda: LaserLine(Q4, covariance=np.diag([1, 0]))),
         # fits

@@ -1,4 +1,4 @@
-"""Base and tool that suit a robot best: where a fit begins, what true errors are relative to."""
+"""Alignment of base and tool: the start of a fit, and the reference of true errors."""
 
 from __future__ import annotations
 

@@ -48,8 +48,8 @@ def candidate_parameters(
     couplings : iterable of (int, int)
         Pairs (j, i) of frames: the reading of joint i moves joint j.
     compliance : Compliance or str
-        What deflects under gravity: ``"none"``, ``"joints"``, ``"links"``, ``"isotropic"`` or
-        ``"uniform"`` (see `Compliance`).
+        Elements that deflect under gravity: ``"none"``, ``"joints"``, ``"links"``,
+        ``"isotropic"`` or ``"uniform"`` (see `Compliance`).
     eccentricity : bool
         Whether readings have errors in the sine and cosine of the joint and of twice its value.
 

@@ -151,7 +151,7 @@ def beyond_limits(model: RobotModel, q: Array, rows: set[int]) -> tuple[list[str
 
 
 def _slip(pair: tuple[str, str], ratio: float) -> tuple[str, float]:
-    """Sentence on lengths of a unit that were taken for another, and the factor that mends them."""
+    """Sentence on lengths given in a wrong unit, and the factor that corrects them."""
     unit, taken = pair
     looks = f", as if {unit} had been converted as {taken}"
     looks = f"; these look like {unit}" if taken == "metres" else looks

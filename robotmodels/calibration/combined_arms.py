@@ -1,4 +1,4 @@
-"""Two robots as one tree, so that links between them are measured like everything else."""
+"""Two robots combined into one tree, for measurements of links between them."""
 
 from __future__ import annotations
 

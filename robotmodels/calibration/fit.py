@@ -80,8 +80,8 @@ def fit(
 
     Parameters that the measurements do not determine stay nominal or are regrouped into others.
     All measurements take part; the errors on held-out data come from further fits. Where the
-    residuals depend on the posture in a way that no parameter explains, a note says so and, with
-    folds, names the term to try next and what it gains on held-out data.
+    residuals depend on the posture in a way that no parameter explains, a note reports it and,
+    with folds, names the term to try next and the gain on held-out data.
 
     Parameters
     ----------

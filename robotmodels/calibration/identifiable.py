@@ -91,7 +91,7 @@ class IdentifiableParameters(Frozen):
 
     @property
     def count(self) -> int:
-        """How many can be estimated."""
+        """Number of parameters that can be estimated."""
         return len(self.kept)
 
     def of_reason(self, reason: Reason) -> tuple[str, ...]:

@@ -58,7 +58,7 @@ def notes_after(
     ]
     if far:
         notes.append(
-            f"{', '.join(far)}: corrections that no robot needs. Look for an error of units (mm "
+            f"{', '.join(far)}: corrections of implausible size. Look for an error of units (mm "
             "for m, degrees for rad), joints in another order or with another sign or zero, "
             "rotations the other way round; or the data do not determine these parameters."
         )

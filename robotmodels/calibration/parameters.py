@@ -17,14 +17,14 @@ from .extended_table import JOINT_VARIABLE, Element, ExtendedTable, gravity_load
 
 
 class ErrorLaw(Enum):
-    """How the error of an element depends on the configuration: ``error = parameter * factor``.
+    """Laws of the error of an element in the configuration: ``error = parameter * factor``.
 
     The value is the prefix of the names; constant errors are named by their element. A new law is
     a new member.
     """
 
     unit: str
-    """Unit of the parameter; ``{}`` stands for that of its element."""
+    """Unit of the parameter; ``{}`` is replaced by that of its element."""
     factor: Callable[[Array], Array] | None
     """By the reading of a joint (rad or m); None for 1 and for the gravity load (N m or N)."""
 

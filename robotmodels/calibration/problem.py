@@ -77,7 +77,7 @@ class Problem(Rebuilt):
         return any(m.sees_base for m in self.measurements)
 
     def columns(self, measurement: Measurement) -> NDArray[np.int64]:
-        """Where the fixtures of a measurement are among all, shape (its F,)."""
+        """Numbers of the fixtures of a measurement among all, shape (its F,)."""
         number = {fixture.name: k for k, fixture in enumerate(self.fixtures)}
         return np.array([number[fixture.name] for fixture in measurement.fixtures], dtype=np.int64)
 

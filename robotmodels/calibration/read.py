@@ -138,7 +138,7 @@ def read_measurements(
 
     def readings(given: Sequence[Column] | None, what: str) -> list[Array]:
         if given is None and what == "other_joints":
-            raise InvalidValueError("other_joints: two ends need two readings.")
+            raise InvalidValueError("other_joints: two measured ends need the readings of both.")
         parts = []
         for t in tables:
             alone = not (t.names or needs or given) and t.width == model.n

@@ -54,7 +54,7 @@ class SelectedConfigurations(Frozen):
     Parameters
     ----------
     kind, criterion, parameters
-        What shall be measured, the index that was maximised, p parameters that are identified.
+        The kind of measurement, the index that was maximised, p parameters that are identified.
     groups : ndarray, shape (count, m, n)
         Postures of each configuration: one, or several of a contact; rad, m.
     candidates : ndarray of int, shape (count,)
@@ -110,7 +110,7 @@ class SelectedConfigurations(Frozen):
         reach. None if the selected ones are not that many.
         """
         if not 0.0 < gain < 1.0:
-            raise InvalidValueError(f"gain: expected a part between 0 and 1, got {gain!r}.")
+            raise InvalidValueError(f"gain: expected a fraction between 0 and 1, got {gain!r}.")
         large = np.flatnonzero(self.gains >= gain)
         first = int(large[-1]) + 1 if len(large) else 0
         return int(self.counts[first]) if first < len(self.counts) - 1 else None
@@ -164,7 +164,7 @@ def select_configurations(
     model, parameters, known_lengths, frame, rng, progress
         See `robotmodels.calibration`. The identifiable ones among the parameters count.
     kind : class or str
-        What shall be measured: `Pose`, `PointContact`, ... or ``"point_contact"``, ...
+        The kind of measurement: `Pose`, `PointContact`, ... or ``"point_contact"``, ...
     count : int
         How many configurations, or contacts.
     candidates : array_like, shape (N, n) or (N, m, n), optional

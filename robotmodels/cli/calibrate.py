@@ -38,8 +38,8 @@ OPTIONS = """\
 the measurements:
 --measurements FILE [required +] CSV files, or one folder
 --kind KIND [required
-    position|pose|orientation|distance|relative-pose|point-contact|frame-contact|plane-contact] what
-    was measured: %(choices)s
+    position|pose|orientation|distance|relative-pose|point-contact|frame-contact|plane-contact] kind
+    of the measurements: %(choices)s
 --pattern [=*.csv] of the files in a folder
 @units
 --joint-angles [rad|deg] unit of the readings of joints, if another
@@ -47,8 +47,8 @@ the measurements:
     angle_axis, euler, ...
 --joints COLUMN [+] columns of the readings of the joints, by name or number from 0
 --other-joints COLUMN [+] columns of the readings at the other end of a distance
---columns COLUMN [+] columns of what was measured (x y z, then the orientation)
---label COLUMN [] column that says which point or plane is touched; default: the names of the files
+--columns COLUMN [+] columns of the measured values (x y z, then the orientation)
+--label COLUMN [] column of the labels of touched points or planes; default: the names of the files
 @delimiter
 --frame [] measured end: a frame of the robot (default: the tool)
 --sigma NUMBERS [] standard deviations of a measurement in m and rad: one, or one for each
@@ -59,11 +59,11 @@ the fit:
 --parameters NAME [+] candidates, such as theta2 d3 (default: all)
 --known NAME [+ =] parameters that stay as they are
 --known-lengths NAME [+ =] the same, for lengths that give the scale
---fixed-base [flag] the robot stands as given
---fixed-tool [flag] the tool is as given
+--fixed-base [flag] the base pose is exact
+--fixed-tool [flag] the tool pose is exact
 --gains [flag] errors of gain of the encoders
 --eccentricity [flag] encoders off their axes
---compliance [none|joints|links|isotropic|uniform =none] what gives way under gravity
+--compliance [none|joints|links|isotropic|uniform =none] elements that deflect under gravity
 --loss [squares|huber|cauchy|tukey =squares] all but the first against outliers
 --prior LENGTH ANGLE|none [] standard deviations of the table's lengths (m) and angles (rad) that
     are expected, or none (default: 1e-3 5e-3)

@@ -70,8 +70,8 @@ def accepted_test(
         )
     if np.shares_memory(log.q, test.q):
         raise InvalidValueError(
-            "test: it has rows of the log that is fitted, so that it is no test; give rows "
-            "that are not fitted."
+            "test: it shares rows with the fitted log, so that it is not independent; give "
+            "rows that are not fitted."
         )
     if not checked:
         return test, ()

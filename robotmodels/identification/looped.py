@@ -53,7 +53,7 @@ class LoopedEquations(Equations):
 
 
 def looped_method(robot: LoopedRobot, method: Method, others: dict[str, bool]) -> Method:
-    """The method without shrinkage; what is not offered for loops is refused by name."""
+    """The method without shrinkage; options that loops do not support are refused."""
     refused = [name for name, given in others.items() if given]
     if type(method) not in (Ols, Wls, Irls):
         refused.append(f"method={method.name!r}")

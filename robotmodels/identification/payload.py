@@ -43,7 +43,7 @@ class PayloadStatus(Outcome):
     COMPLETE = 0, "All ten parameters are identified."
     PARTIAL = 1, "Only some of the ten parameters, or combinations, are identifiable."
     INSIGNIFICANT = 2, "No parameter differs from zero by three standard errors: there is no load."
-    NO_FEASIBLE_BODY = 3, "No physically consistent body was found: unconstrained estimates."
+    NO_FEASIBLE_BODY = 3, "No physically consistent body was found; estimates are unconstrained."
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -217,7 +217,7 @@ def parameters_section(result: IdentificationResult) -> ReportSection:
         )
         tables.setdefault(units[k], []).append(row)
     for unit, rows in tables.items():
-        headings = (unit, "stands for", "value", "std err", "rel.", "95 % from", "to")
+        headings = (unit, "regrouped", "value", "std err", "rel.", "95 % from", "to")
         body.append(table_of(headings, rows))
     return ReportSection("Parameters", tuple(body))
 

@@ -67,7 +67,7 @@ class LinkedFrames(Labelled):
 
     def _check(self) -> None:
         if self.frame == self.frame_other:
-            raise InvalidValueError(f"frame_other: expected another end than {self.frame!r}.")
+            raise InvalidValueError(f"frame_other: expected an end other than {self.frame!r}.")
 
     @property
     def row_numbers(self) -> tuple[int, ...]:
@@ -119,7 +119,7 @@ class KnownDistance(Measurement):
 
     def _check(self) -> None:
         if self.point == self.other:
-            raise InvalidValueError(f"other: expected another point than {self.point!r}.")
+            raise InvalidValueError(f"other: expected a point other than {self.point!r}.")
         length = float(as_floats(self.length, "length"))
         if length <= 0.0:
             raise InvalidValueError(f"length: expected a positive length in metres, got {length}.")

@@ -44,7 +44,7 @@ class ClosedLoopSimulator:
                 self.references[piece.begin] = self._references(piece)
 
     def _references(self, piece: Piece) -> References:
-        """Those of the log, or its filtered positions, of the recording of a piece."""
+        """References of the recording of a piece: those of the log, or its filtered positions."""
         log, processing, loop = self.system.log, self.system.processing, self.loop
         ahead = loop.controller.feed_forward
         if log.q_ref is not None:
