@@ -13,7 +13,7 @@ from .errors import InvalidValueError
 
 
 class Outcome(IntEnum):
-    """Base of status codes: a number that fits int8 and the sentence a person reads."""
+    """Base of status codes: a number that fits int8 and a sentence that explains it."""
 
     sentence: str
 
@@ -53,13 +53,13 @@ class Result(Frozen, Value):
 
     def __repr__(self) -> str:
         """The sentence of a single row or the count of the outcomes of several, then the fields."""
-        one = np.ndim(self.status) == 0  # type: ignore[attr-defined]
-        said = self.reason() if one else f"{self.counted}."
-        return f"<{type(self).__name__}: {said} {self._texts(Outcome, Value)}>"
+        single = np.ndim(self.status) == 0  # type: ignore[attr-defined]
+        summary = self.reason() if single else f"{self.counted}."
+        return f"<{type(self).__name__}: {summary} {self._texts(Outcome, Value)}>"
 
     @property
     def counted(self) -> str:
-        """How many rows have which outcome, in words."""
+        """Number of rows with each outcome, in words."""
         codes, numbers = np.unique(self.status, return_counts=True)  # type: ignore[attr-defined]
         pairs = zip(codes, numbers, strict=True)
         return ", ".join(f"{m} {self.outcomes(int(c)).name}" for c, m in pairs) or "empty"

@@ -1,4 +1,4 @@
-"""Errors and warnings: each says what was expected, what came, and what to do."""
+"""Errors and warnings: each states the expected value, the given value and the remedy."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ class TableError(RobotModelsError, ValueError):
 
 
 class InertiaError(RobotModelsError, ValueError):
-    """Inertial or drive parameters that cannot be meant."""
+    """Inertial or drive parameters that are impossible."""
 
 
 class SingularMassMatrixError(RobotModelsError, ValueError):
-    """The direct dynamic model has no answer: the mass matrix cannot be inverted."""
+    """The direct dynamic model has no solution: the mass matrix cannot be inverted."""
 
 
 class LoopError(RobotModelsError, ValueError):
@@ -113,7 +113,7 @@ class RobotModelsWarning(UserWarning):
 
 
 class UrdfWarning(RobotModelsWarning):
-    """Something a model holds has no place in a URDF (or the other way round)."""
+    """A URDF cannot hold a property of a model, or a model one of a URDF."""
 
 
 def nearest_names(name: str, known: Iterable[str], count: int = 3) -> list[str]:

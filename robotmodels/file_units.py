@@ -1,4 +1,4 @@
-"""Units of files: a reader converts what its arguments say, never what the numbers look like."""
+"""Units of files: a reader converts by its arguments, never by the size of the numbers."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 SMALLEST = 1e-9
-"""What is smaller (rad or m) is rounding of a source, not geometry to read: it prints as 0."""
+"""Smaller numbers (rad or m) are rounding errors of a source and print as 0."""
 
 
 def boxed(columns: list[tuple[str, list[str]]]) -> str:

@@ -14,7 +14,7 @@ from ..errors import InvalidValueError, ShapeError
 Array = NDArray[np.float64]
 
 LARGEST = 1e50
-"""Of lengths, inertia and what else makes a model: products of several are floats."""
+"""Largest number in a model (lengths, inertia ...): products of several stay finite."""
 _FLOAT64 = np.dtype(np.float64)
 _MASKS = {"position": (True, False), "xyz": (True, False), "orientation": (False, True)}
 _AT_A_TIME = 2**18

@@ -21,7 +21,7 @@ T = TypeVar("T")
 Task = tuple[Callable[[], T], float]
 """A piece of work, and the fraction of all work that is done after it."""
 Progress = bool | Callable[[float], None] | None
-"""Who is told the fraction done: nobody, the log of Python (True), or a function."""
+"""Receiver of the fraction done: none, the log of Python (True), or a function."""
 
 
 def results(
@@ -50,7 +50,7 @@ def results(
 
 @dataclass(frozen=True, slots=True)
 class Workers:
-    """An executor, and who is told the fraction done, between ``low`` and ``high``."""
+    """An executor, and the receiver of the fraction done, between ``low`` and ``high``."""
 
     executor: Executor | None = None
     progress: Progress = None

@@ -1,4 +1,4 @@
-"""Values nobody changes: read-only arrays, equality and hash of what holds them, copies of it."""
+"""Immutable values: read-only arrays, and equality, hash and copies of objects that hold them."""
 
 from __future__ import annotations
 

@@ -22,13 +22,13 @@ examples:
   robotmodels follow lab_trr points.csv --no-limits --picture graph.png
 
 Each row of the file is a pose in world axes: x y z; x y z roll pitch yaw; x y z and a unit
-quaternion qx qy qz qw; or the 16 numbers of the 4x4 matrix. A row of names may stand first."""
+quaternion qx qy qz qw; or the 16 numbers of the 4x4 matrix. The first row may hold names."""
 _WIDTHS = (3, 6, 7, 16)
 
 
 DESCRIPTION = """\
-Follow a path of poses from every posture of its first pose: from which ones it reaches the end
-without a jump, and where it breaks for the others."""
+Follow a path of poses from every posture of its first pose: postures that reach the end
+without a jump, and the breaks of the others."""
 OPTIONS = """\
 @robot
 poses [path] file with one pose in each row
@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> Report:
 
 
 def as_text(found: FeasiblePath, scale: Array | float) -> str:
-    """The outcome for people."""
+    """The outcome as text."""
     lines = [f"{len(found.q)} poses: {found.reason()}"]
     rows = found.postures[0] if len(found.q) else np.zeros((0, 0))
     starts = rows[~np.isnan(rows).any(axis=1)] * scale

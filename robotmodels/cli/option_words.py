@@ -26,7 +26,7 @@ _WHOLE = (
     ("Give the model masses (with_inertia)", "Give the URDF of the robot masses (<inertial>)"),
     ("Pass metres: multiply", "In metres: multiply"),
 )  # fmt: skip
-"""Words of the package, and the option that says the same."""
+"""Words of the package, and the option of the same meaning."""
 _OTHER_NAMES = {
     "position_references": "--references",
     "rng": "--seed",

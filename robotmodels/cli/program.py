@@ -1,4 +1,4 @@
-"""The commands, their parser, and what a person reads when something is wrong."""
+"""The commands, their parser, and their error messages."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def parser_of(command: str | None) -> tuple[Parser, Parser | None]:
         prog="robotmodels",
         description="Kinematics, dynamics, calibration and identification of robot manipulators "
         "from their Khalil-Kleinfinger table or their URDF. SI units and radians, unless an option "
-        "says otherwise.",
+        "states otherwise.",
         epilog=f"{_EXAMPLES}\n\n{statuses()}",
     )
     parser.add_argument("--version", action="version", version=f"robotmodels {__version__}",
@@ -171,13 +171,13 @@ def _run(words: list[str]) -> int:
     except Exception as error:  # noqa: BLE001  # nobody asked for a traceback at a terminal
         if "--traceback" in words:
             traceback.print_exc()
-        said, status = _outcome(error, options)
-        say(said)
+        message, status = _outcome(error, options)
+        say(message)
         return status
 
 
 def _outcome(error: Exception, options: Sequence[str]) -> tuple[str, ExitStatus]:
-    """What is said of an error, and how the command ends."""
+    """Message of an error, and the exit status."""
     if isinstance(error, RobotModelsError):
         return in_options(str(error), options), ExitStatus.WRONG_INPUT
     if isinstance(error, OSError):
@@ -188,8 +188,8 @@ def _outcome(error: Exception, options: Sequence[str]) -> tuple[str, ExitStatus]
         return f"{text}.", ExitStatus.WRONG_INPUT
     if isinstance(error, MemoryError):
         return "there is not enough memory for this.", ExitStatus.WRONG_INPUT
-    said = (
+    message = (
         f"this is a bug: {type(error).__name__}: {error}. Please report it as an issue of the "
         "repository of robotmodels, with what the same command prints with --traceback."
     )
-    return said, ExitStatus.BUG
+    return message, ExitStatus.BUG

@@ -26,7 +26,7 @@ OPTIONS = """\
 --kind [positions|primary|secondary =positions] positions in any orientation, in every one, or in
     some but not every one
 --section [auto|plane|space =auto] half a plane through the first axis, or space (default: the plane
-    where it stands for all)
+    where it represents the workspace)
 @no_limits
 --resolution CELLS [int] cells along each coordinate
 @mask
@@ -82,7 +82,7 @@ def numbers_of(w: Workspace) -> dict[str, Any]:
 
 
 def as_text(data: dict[str, Any]) -> str:
-    """The same for people."""
+    """Areas, volumes and special points as text."""
     lines = [
         f"Workspace of {data['robot']} ({data['kind']}, {data['coordinates']}): {data['reason']}"
     ]

@@ -32,7 +32,7 @@ def idm(
 ) -> Array:
     """Inverse dynamic model (``rnea``, ``rne``): joint torques of a motion.
 
-    ``tau = M(q) a + C(q, v) v + g(q) + J^T wrench + Ia a + Fv v + Fc sign(v) + offset + friction``
+    ``tau = M(q) a + C(q, v) v + Q(q) + J^T wrench + Ia a + Fv v + Fc sign(v) + offset + friction``
 
     It is linear in the inertial parameters; base parameters and negative masses are allowed, too.
 

@@ -1,8 +1,8 @@
 """The inverse geometric model on a tape: Paul's plan, all branches at once.
 
 The plan that `explain_igm` prints and that the package's kernel runs is unrolled: every step is
-solved for each of its solutions, and a flag goes along that says whether they exist. At a singular
-pose an undetermined joint is 0, and the status of the pose says so. Each solver takes the
+solved for each of its solutions, and a flag marks those that exist. At a singular
+pose an undetermined joint is 0, and the status of the pose reports it. Each solver takes the
 coefficients of its type of equation and returns its solutions.
 
 References

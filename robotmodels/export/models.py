@@ -76,7 +76,7 @@ def program(
     """Write a model of a robot as straight-line code: Khalil's customised symbolic models.
 
     The recursion runs once over the scalars of a tape: operations on constants are carried out,
-    zeros and ones removed, equal operations shared, what no result needs is dropped. With numbers
+    zeros and ones removed, equal operations shared, unused operations dropped. With numbers
     for both, base parameters replace those of the model where they give the same torques.
 
     Parameters
@@ -90,11 +90,11 @@ def program(
     parameters : {"numbers", "symbols", "base"}
         Dynamic parameters: those of the model; all standard ones as the last input
         (`parameter_names`); the base parameters of `base_parameters` as the last input, where
-        ``drive=True`` stands for ``("Ia", "Fv", "Fc")`` and offsets are those of the model.
+        ``drive=True`` means ``("Ia", "Fv", "Fc")`` and offsets are those of the model.
     geometry : {"numbers", "symbols"}
-        Geometric parameters: those of the table; or lengths that are not zero, and what
-        ``DHTable.symbols`` names, as an input before the parameters. Base, tool and gravity are
-        numbers.
+        Geometric parameters: those of the table; or lengths that are not zero, and constants
+        that ``DHTable.symbols`` names, as an input before the parameters. Base, tool and gravity
+        are numbers.
     drive : bool or collection of DriveKind or str
         Terms of the drives, coupled motors included: all, none, or some kinds. Geometric models
         and `gravity_torque` have none.
@@ -120,8 +120,8 @@ def program(
     ``"igm"`` returns all branches ``q (S, n)`` in (-pi, pi], ``valid (S,)`` and a ``status`` of
     `IGMStatus`: ``REACHED``; ``REACHED_FAMILY``: a joint that the pose leaves free is 0;
     ``INCOMPLETE``: near a singular pose or on the boundary of the workspace, where postures may be
-    missing or appear twice; ``NOT_CONVERGED``: no posture (`igm` tells why). Joint limits are
-    ignored, and inputs are not checked: ``T`` must be a pose.
+    missing or appear twice; ``NOT_CONVERGED``: no posture (`igm` gives the reason). Joint limits
+    are ignored, and inputs are not checked: ``T`` must be a pose.
 
     References
     ----------

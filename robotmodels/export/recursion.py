@@ -85,7 +85,7 @@ def _turned(a: Vector, axis: int, c: Number, s: Number) -> Vector:
 
 
 def _cosine_sine(angle: Number, offset: Number = 0.0) -> tuple[Number, Number]:
-    """Of the sum of two angles, the first variable; exact where the table prints a fraction."""
+    """Cosine and sine of the sum of a variable and a constant angle, exact for fractions of pi."""
     if isinstance(offset, Scalar):
         angle, offset = angle + offset, 0.0
     if isinstance(angle, Scalar):

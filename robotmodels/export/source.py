@@ -142,7 +142,7 @@ def write(program: Program, path: str | Path, language: str | None = None) -> No
 
 
 class Language(NamedTuple):
-    """How a language writes elements ``name(i, j)``, assignments, functions, results and a file."""
+    """Syntax of a language: elements ``name(i, j)``, assignments, functions, results, a file."""
 
     suffix: str
     comment: str

@@ -200,7 +200,7 @@ def rest_to_rest(arm: FlexibleRobot, q0: ArrayLike, q1: ArrayLike, duration: flo
     rates = np.sqrt(np.diag(arm.parts.K)[n:] / np.diag(mass_matrix(arm, ends[0]))[n:])
 
     def left_over(found: Any) -> tuple[Array, Array]:
-        """What is left at the end (2 m,), relative to the sizes on the way; those sizes."""
+        """Elastic state at the end (2 m,) relative to the sizes along the motion; those sizes."""
         most = np.abs(found.y).max(axis=1, initial=0.0)
         e = np.maximum(most[:m], floor)  # velocities: of vibrations as large as these
         size = np.concatenate([e, np.maximum(most[m:], rates * e)])

@@ -46,7 +46,7 @@ class SpinStatus(Outcome):
 
     STIFF = 0, "The elastic stiffness of every link is positive at its angular velocity."
     SOFTENED = 1, "A link spins above its own critical speed: make it with stiffening=True."
-    LARGE_DEFLECTION = 2, "Deflections exceed second order of stiffening=True: take fewer modes."
+    LARGE_DEFLECTION = 2, "Deflections are too large for stiffening=True: take fewer modes."
 
 
 class Accelerations(Result, tuple[Array, Array]):

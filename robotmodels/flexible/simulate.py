@@ -286,7 +286,7 @@ def _compiled_steps(
 
 
 def _ended(status: FlexibleMotionStatus, spun: Sequence[float]) -> FlexibleMotionStatus:
-    """How a motion ended, given the codes of `SpinStatus` on its way."""
+    """Status of a motion, given the codes of `SpinStatus` along it."""
     if status and SpinStatus.LARGE_DEFLECTION in spun:
         return FlexibleMotionStatus.LARGE_DEFLECTION
     softened = status != FlexibleMotionStatus.NOT_CONVERGED and SpinStatus.SOFTENED in spun

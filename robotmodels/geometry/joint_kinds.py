@@ -1,4 +1,4 @@
 """Kinds of joints: revolute, prismatic, fixed."""
 
 REVOLUTE, PRISMATIC, FIXED = 0, 1, 2
-"""Values of sigma, seed eq. [1.2]; 2 marks a frame that is fixed to its antecedent."""
+"""Values of sigma, book eq. [1.2]; 2 marks a frame that is fixed to its antecedent."""

@@ -23,7 +23,7 @@ def default_names(sigma: NDArray[np.int64]) -> tuple[str, ...]:
 
 
 def checked_names(names: Sequence[str], f: int) -> tuple[str, ...]:
-    """The names of f frames, or the error that says what is wrong with them."""
+    """The names of f frames; raises for names that cannot be used."""
     if isinstance(names, str) or not isinstance(names, Iterable):
         raise TableError(f"names: expected a list of names, one for each row, got {names!r:.80}.")
     labels = tuple(map(str, names))
@@ -87,7 +87,7 @@ def constant_names(symbols: Mapping[tuple[str, int], str]) -> dict[str, str]:
     Returns
     -------
     dict of str to str
-        Such as ``{"D3": "L1"}``: names that are identifiers, stand for one constant each and are
+        Such as ``{"D3": "L1"}``: names that are identifiers, denote one constant each and are
         not used by formulas otherwise.
 
     Examples

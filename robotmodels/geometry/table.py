@@ -232,7 +232,7 @@ class DHTable:
         return replace(self, **columns)  # type: ignore[arg-type]
 
     def __str__(self) -> str:
-        # columns that say nothing are left out, as in the book's tables of serial robots
+        # columns that hold only zeros are left out, as in the book's tables of serial robots
         rows = range(self.f)
         columns = [("j", [str(j + 1) for j in rows])]
         if not self.is_serial:

@@ -10,8 +10,8 @@ values, gravity
 Returns
 -------
 LoopedRobot
-    Spanning tree, closures and actuated joints. ParFileError or LoopError names what a file has
-    that is not supported, by name.
+    Spanning tree, closures and actuated joints. ParFileError or LoopError names the
+    entries of a file that are not supported.
 
 References
 ----------

@@ -42,7 +42,7 @@ def base_parameters(
     """Base inertial parameters: the minimal set that determines the torques.
 
     Also called minimal, barycentric or identifiable parameters. Both methods keep Khalil's choice:
-    the parameters of the frames nearest to the base before those behind them, link parameters
+    the parameters of the frames nearest to the base before those farther away, link parameters
     before ``Ia`` before ``Fv``, ``Fc`` and ``offset`` before those of a friction model; dependent
     parameters are regrouped into earlier ones. Only a parameter with little effect (less than 1e-4
     of the largest) is regrouped into a later one.
@@ -131,7 +131,7 @@ def base_parameters(
 def _regrouping(columns: TorqueColumns, symbolic: bool) -> tuple[NDArray[np.int64], Array, bool]:
     """Kept parameters (b,), combinations (b, p), and whether the numeric method decided.
 
-    It decides what depends on a zero tolerance; couplings and friction have no rule.
+    It decides cases that depend on a zero tolerance; couplings and friction have no rule.
     """
     if not symbolic:
         return columns.basis.kept, columns.basis.coefficients, True

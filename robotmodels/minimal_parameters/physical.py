@@ -48,8 +48,8 @@ class PhysicalStatus(Outcome):
     """Outcome of the search for a physical robot."""
 
     EXACT = 0, "The robot has exactly these base parameters; its residuals are not increased."
-    CONSTRAINED = 1, "No physical robot has these base parameters; this one is the best of all."
-    WEIGHTED = 2, "The best compromise of residuals and distance from the prior, by its weight."
+    CONSTRAINED = 1, "No physical robot has these base parameters; this has the least residuals."
+    WEIGHTED = 2, "The robot minimises the residuals plus the weighted distance from the prior."
     INACCURATE = 3, "The solver stopped early: the robot is physical, but a better one may exist."
     INFEASIBLE = 4, "No physical robot satisfies the bounds; widen one, or use a smaller margin."
     FAILED = 5, "The solver did not converge; the parameters are not to be used."

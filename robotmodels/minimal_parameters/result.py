@@ -206,7 +206,7 @@ class BaseParameters:
 
     @property
     def latex(self) -> str:
-        """The same in LaTeX."""
+        """The table of the book, in LaTeX."""
         return base_latex(self)
 
     def _repr_markdown_(self) -> str:

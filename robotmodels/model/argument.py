@@ -63,7 +63,7 @@ def _warn_of_degrees(model: RobotModel, q: Array) -> None:
 
 
 def check_model(model: object) -> None:
-    """Refuse what is not a model, with a hint for what it is."""
+    """Refuse anything but a model, with a hint that depends on its type."""
     if isinstance(model, RobotModel):
         return
     hint = "build one with RobotModel.from_table(...), RobotModel.from_urdf(...) or load(...)"

@@ -1,4 +1,4 @@
-"""Names that other programs give to methods and attributes of a robot, and what replaces them."""
+"""Names of methods and attributes of a robot in other programs, and their replacements."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ REPLACEMENTS = {
     "nq": "robot.n",
     "nv": "robot.n",
 }  # fmt: skip
-"""By the name in another program: the call or attribute here."""
+"""Calls or attributes here, by the name in another program."""
 
 
 def no_attribute(kind: str, name: str) -> AttributeError:

@@ -15,7 +15,7 @@ from ..geometry import NOT_XML, DHTable
 
 
 def check_table(table: object) -> None:
-    """Refuse what is no table."""
+    """Refuse anything but a table."""
     if not isinstance(table, DHTable):
         raise InvalidValueError(
             f"table: expected a DHTable, got {type(table).__name__}; build one with "
@@ -34,7 +34,7 @@ def check_name(name: object) -> None:
 
 
 def check_tip(tip: object, f: int) -> None:
-    """Refuse what is not the number of one of f frames."""
+    """Refuse anything but the number of one of f frames."""
     if not isinstance(tip, (int, np.integer)) or not 1 <= tip <= f:
         raise FrameNotFoundError(
             "frame number", tip, map(str, range(1, f + 1)), "tip is a number, 1 to f."

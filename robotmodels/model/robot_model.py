@@ -54,13 +54,13 @@ class RobotModel:
     ----------
     name, table, inertia, drive, base, tool, tip, gravity, transmission, configurations
         As for `from_table`, checked. ``base`` is ``Z``, the pose of R_0 in the world, and ``tool``
-        ``E``, that of the tool in the tip frame, both of shape (4, 4) (seed eq. [1.10]).
+        ``E``, that of the tool in the tip frame, both of shape (4, 4) (book eq. [1.10]).
     frames : tuple of NamedFrame
         Frames of interest, such as every link of a source URDF.
     visuals : tuple of Visual
         Shapes of a source URDF.
     notes : tuple of str
-        What a reader merged, locked or left out, in sentences.
+        Parts that a reader merged, locked or left out, in sentences.
     source : UrdfSource or None
         Text and options of the URDF that it was read from; no part of equality.
 
@@ -191,7 +191,7 @@ class RobotModel:
         path_or_text : str or Path
             A file, or the text itself.
         base_link : str, optional
-            Link whose frame is the world; default the root. What is above it is left out.
+            Link whose frame is the world; default the root. Links above it are left out.
         tip_link : str, optional
             Link whose frame is the tool. Only the joints between base and tip are kept, others
             are locked at zero. Default: all joints below the base are kept; see Notes for the tool.
@@ -378,7 +378,7 @@ class RobotModel:
 
     @property
     def parts(self) -> RobotParts:
-        """What a URDF is written from."""
+        """Parts from which a URDF is written."""
         return RobotParts(**{part.name: getattr(self, part.name) for part in fields(RobotParts)})
 
     def __repr__(self) -> str:

@@ -11,7 +11,7 @@ _SHOWN = 6
 
 
 def tip_text(parts: RobotParts) -> str:
-    """Where the tool is, and links that could be ``tip_link`` instead; one line each."""
+    """Link and frame of the tool, and links that could be ``tip_link`` instead; one line each."""
     table, tip = parts.table, parts.tip
     at = [f for f in parts.frames if f.parent == tip and np.array_equal(f.pose, parts.tool)]
     links = " = ".join(frame.name for frame in at)

@@ -25,7 +25,7 @@ _FRAME_KINDS = frozenset((str, int, type(None)))
 
 @dataclass(frozen=True, slots=True)
 class FrameOfInterest:
-    """A frame whose pose or Jacobian can be asked for.
+    """A frame whose pose or Jacobian can be computed.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class FrameOfInterest:
 
     @property
     def kernel_arguments(self) -> tuple[NDArray[np.int64], Array, Array]:
-        """What compiled kernels take: path, rotation, position."""
+        """Arguments of compiled kernels: path, rotation, position."""
         return self.path, self.rotation, self.position
 
 
@@ -88,7 +88,7 @@ class PinocchioTwin:
         table, fixed = parts.table, parts.table.sigma == FIXED
         on_base = [j for j in range(table.f) if all(fixed[i - 1] for i in table.path(j + 1))]
         self.base_is_massless = not parts.inertia.values[on_base].any()
-        # one warning where the torques of a robot are asked for that has no masses and no drives
+        # one warning where the torques of a robot without masses and drives are computed
         d = parts.drive
         given, t = [parts.inertia.values, d.Ia, d.Fv, d.Fc, d.offset], parts.transmission
         given += [] if t is None else [t.Iam, t.Fvm, t.Fcm]
@@ -116,7 +116,7 @@ class PinocchioTwin:
         return y
 
     def from_pin(self, x: Array) -> Array:
-        """Reorder the last axis of what Pinocchio returned (a copy of its own) to the table's."""
+        """Reorder the last axis of a result of Pinocchio (in a copy) to the table's order."""
         return np.ascontiguousarray(x if self.in_table_order else x[..., self.order])
 
     def frame(self, frame: str | int | None) -> FrameOfInterest:
@@ -156,7 +156,7 @@ class PinocchioTwin:
         raise FrameNotFoundError("frame", frame, self.frame_names())
 
     def frame_names(self) -> tuple[str, ...]:
-        """Every name `frame` knows, without repetition."""
+        """Every name that `frame` accepts, without repetition."""
         named = (frame.name for frame in self._parts.frames)
         names = (self.names.frames[0], *self._parts.table.names, *named, self.names.tool)
         return tuple(dict.fromkeys(names))

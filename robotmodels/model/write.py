@@ -1,4 +1,4 @@
-"""A model as URDF, and what a URDF has no place for."""
+"""A model as URDF, and warnings of properties that a URDF cannot hold."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def to_urdf(model: RobotModel) -> str:
 
     Full-precision numbers, so that reading it back gives the same poses, Jacobians and torques.
     The tool is the link called ``tool``, which `RobotModel.from_urdf` takes for it again. A
-    `UrdfWarning` lists what has no place in a URDF: rotor inertia, torque offsets, gravity other
-    than 9.81 m/s^2 downwards, inertia that no body has, passive joints, transmissions.
+    `UrdfWarning` lists properties that a URDF cannot hold: rotor inertia, torque offsets, gravity
+    other than 9.81 m/s^2 downwards, inertia that no body has, passive joints, transmissions.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def to_urdf(model: RobotModel) -> str:
     Raises
     ------
     UrdfError
-        A transmission ties joints together in a way that a URDF cannot say, so that the text
+        A transmission couples joints in a way that a URDF cannot express, so that the text
         would describe a robot with other poses.
 
     Examples

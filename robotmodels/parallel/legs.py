@@ -196,7 +196,7 @@ def is_looped(robot: Any, mode: Mode = None) -> TypeIs[LoopedPlatform]:
         )
     if mode is not None and np.any(as_reals(mode, "mode") != 0):
         raise InvalidValueError(
-            f"mode: a robot from from_loops has that of its home alone, got {mode!r:.40}."
+            f"mode: a robot from from_loops has mode 0 only, that of its home, got {mode!r:.40}."
         )
     return True
 

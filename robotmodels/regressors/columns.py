@@ -181,8 +181,8 @@ def _number(every: tuple[str, ...], column: object) -> int:
         raise InvalidValueError(
             f"columns: there is no column {column!r} here"
             f"{f'; the nearest are {near}' if near else ''}. Drives have columns of the kinds that "
-            "drive= asks for; friction and offsets have none in an energy, for which base "
-            "parameters with drive=('Ia',) or without drives are made."
+            "drive= selects; an energy has none of friction and offsets, so that it needs base "
+            "parameters made with drive=('Ia',) or without drives."
         )
     if isinstance(column, (bool, np.bool_)) or not isinstance(column, (int, np.integer)):
         raise InvalidValueError(f"columns: expected numbers or names, got {column!r:.80}.")

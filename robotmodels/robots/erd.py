@@ -24,7 +24,7 @@ _FOLDER = Path("share", "example-robot-data", "robots")
 
 @dataclass(frozen=True, slots=True)
 class ErdArm:
-    """Where a robot of example-robot-data is, and which part of it is meant."""
+    """File of a robot of example-robot-data, and its base and tip links."""
 
     urdf: str
     base_link: str | None = None
@@ -39,7 +39,7 @@ ERD_ARMS: dict[str, ErdArm] = {
         (files(str(__package__)) / "erd.toml").read_text("utf-8")
     ).items()
 }
-"""What ``erd:<name>`` loads."""
+"""Robots that ``erd:<name>`` loads."""
 
 
 def load_erd(name: str) -> RobotModel:

@@ -1,4 +1,4 @@
-"""Whether a matrix is a pose: checks, which make what is nearly a rotation orthogonal.
+"""Checks that a matrix is a pose; rotations that are nearly orthogonal are made so.
 
 Parameters
 ----------

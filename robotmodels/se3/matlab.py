@@ -16,8 +16,8 @@ Raises
 ShapeError, InvalidValueError
     Another shape, such as the one that needs no conversion; NaN or infinity.
 NotARotationError
-    A pose whose last row is not 0 0 0 1, so that it is no pose, or the order is another one: that
-    (4, 4, 4) is in MATLAB's order is not guessed, the name of the function says so.
+    A matrix whose last row is not 0 0 0 1: no pose, or axes in another order. The order of an
+    array of shape (4, 4, 4) is not guessed; the function that is called defines it.
 
 References
 ----------

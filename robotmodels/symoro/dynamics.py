@@ -1,4 +1,4 @@
-"""Inertia, drives and gravity, and what of a file has no place in a model."""
+"""Inertia, drives and gravity, and notes on entries of a file that a model cannot hold."""
 
 from __future__ import annotations
 

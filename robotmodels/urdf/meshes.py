@@ -13,7 +13,7 @@ from ..errors import InvalidValueError, MeshNotFoundError
 
 @dataclass(frozen=True, slots=True)
 class MeshFinder:
-    """Where to look for meshes: nothing outside of these folders and the URDF's package is read."""
+    """Folders of meshes: nothing outside of these folders and the URDF's package is read."""
 
     package_dirs: tuple[Path, ...] = ()
     urdf_dir: Path | None = None

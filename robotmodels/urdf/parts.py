@@ -1,4 +1,4 @@
-"""What a robot is made of, on its way into or out of a URDF."""
+"""Parts of a robot that is read from a URDF or written to one."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class UrdfSource:
 
 @dataclass(frozen=True, slots=True)
 class RobotParts:
-    """Everything a URDF can say about a robot, and what it cannot.
+    """All parts of a robot, those that a URDF cannot hold included.
 
     Parameters
     ----------

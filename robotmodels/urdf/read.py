@@ -204,7 +204,7 @@ def _walk(
 
 
 def _tip_notes(tip: str, beyond: int, branches: int) -> list[str]:
-    """Where the tool is, if there was a choice."""
+    """Notes on the link of the tool, if there was a choice."""
     if tip == TOOL or (branches == 1 and not beyond):
         return []
     end = f", the end of the last of {branches} branches" if branches > 1 else ""
@@ -232,8 +232,8 @@ def _inertia(tree: UrdfTree, named: tuple[NamedFrame, ...], f: int) -> InertialP
     except InvalidValueError:  # it does not name the link
         largest = max(links, key=lambda link: max(abs(link.mass), *map(abs, link.com)))
         raise UrdfError(
-            f"link {largest.name!r}: its mass, its centre of mass or how far it is from its joint "
-            "is so large that its inertia there is no number."
+            f"link {largest.name!r}: its mass, its centre of mass or its distance from its joint "
+            "is so large that its inertia there overflows."
         ) from None
 
 

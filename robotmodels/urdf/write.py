@@ -29,7 +29,7 @@ def urdf_text(parts: RobotParts, visuals: bool = True) -> str:
     Parameters
     ----------
     parts : RobotParts
-        What to write.
+        The robot to write.
     visuals : bool
         Whether shapes are written: those of the source, else a skeleton sized from the table.
 
@@ -267,7 +267,7 @@ def _mimics(transmission: Transmission | None, joints: tuple[str, ...]) -> dict[
         if masters.size > 1 or master < 0 or K[:, i].any() or K[master, master] != 1.0:
             raise UrdfError(
                 f"joint {joints[i]!r} is tied to others by the transmission in a way that a URDF "
-                "cannot say (only q_i = factor * q_k + offset can be): written without it the "
+                "cannot express (it holds q_i = factor * q_k + offset only): without it the "
                 "robot would reach other poses. Remove it first: model.with_transmission(None)."
             )
         elements[i] = [

@@ -95,7 +95,7 @@ class ServoMotion(Result):
     Times ``t`` (N,), s, which end early where the object is behind the camera or out of sight;
     ``T`` and ``cameras`` (N, 4, 4), poses of the object in the camera and of the camera in the
     world, which without a robot is the object at the start; joints ``q`` (N, n) or None;
-    measurements ``s`` and ``error`` (N, k); ``velocity`` (N, 6) asked of the camera; ``codes`` (N,)
+    measurements ``s`` and ``error`` (N, k); ``velocity`` (N, 6) of the law; ``codes`` (N,)
     of `ServoStatus`; ``task`` and ``camera`` of the call.
     """
 

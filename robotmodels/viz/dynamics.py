@@ -199,7 +199,7 @@ def plot_inertia_map(
             raise InvalidValueError(f"pair: expected two different joints, got {pair!r:.60}.")
         return _maps(grid, names, kinds, joint, two, look)
     if of is not None or pair is not None:
-        raise InvalidValueError("of, pair: of one joint all lines are drawn; leave them out.")
+        raise InvalidValueError("of, pair: all elements are drawn over one joint; leave them out.")
     return _lines(grid, f"{names[0]} ({kinds[0].value})", kinds[0].factor, look)
 
 

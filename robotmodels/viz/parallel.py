@@ -205,7 +205,7 @@ def _points(robot: ParallelRobot, T: Array) -> tuple[Array, LegStates]:
 
 
 def _still(robot: ParallelRobot, points: Array, ghost: bool, dark: bool) -> list[Node]:
-    """What does not move: the platform at home, anchors of the base, the floor."""
+    """Fixed parts: the platform at its home pose, anchors of the base, the floor."""
     nodes = _plate(robot, robot.home, "home", _GHOST) if ghost else []
     nodes += [_ball(f"base/{i}", p, robot, _BASE, 1.6) for i, p in enumerate(robot.base)]
     return [*nodes, *floor_grid(points, dark)]

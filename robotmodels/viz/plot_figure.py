@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 
 class PlotFigure(Figure):
-    """A figure that a notebook shows although pyplot, and so any display, is left alone.
+    """A figure that a notebook shows, made without pyplot and without a display.
 
     IPython knows how to show a plain `matplotlib.figure.Figure` only once pyplot was imported.
     """

@@ -57,7 +57,7 @@ class Options:
     dark: bool = False
 
     def __post_init__(self) -> None:
-        """Check one of them; what draws with the others checks them."""
+        """Check the opacity; the other options are checked where they are used."""
         if as_number(self.opacity, "opacity", least=0.0) > 1.0:
             raise InvalidValueError(f"opacity: expected at most 1, got {self.opacity}.")
 

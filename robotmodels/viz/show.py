@@ -170,7 +170,7 @@ def jog(model: RobotModel, q: ArrayLike | str | None = None, **options: Any) -> 
     The page needs no server. Its panel has a slider and a number for each joint (degrees or
     metres) with the joint's limits, the named configurations, and the pose of the tool or of
     another frame. A joint without limits has a slider from -180 to 180 degrees or -1 to 1 m, and
-    the panel says so. Numbers outside the limits may be typed; they are marked. Joints that a
+    the panel marks it. Numbers outside the limits may be typed; they are marked. Joints that a
     transmission couples (mimic joints) have no slider and follow the others.
     """
     check_model(model)
@@ -192,7 +192,7 @@ def _scene(
     view: tuple[float, float] | None = None,
     **more: Any,
 ) -> Scene:
-    """Robots, extra nodes and what stands around them as a scene that they fill."""
+    """Robots, extra nodes and their surroundings as a scene that they fill."""
     points: Array = np.concatenate([robot.points for robot in robots])
     nodes = [node for robot in robots for node in robot.nodes]
     nodes += extra

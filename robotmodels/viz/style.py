@@ -293,7 +293,7 @@ def as_named(given: Any, names: Any, name: str, of: str) -> dict[str, Any]:
 
 
 def as_columns(columns: Any, count: int, default: int) -> int:
-    """How many panels stand in a row."""
+    """Number of panels in a row."""
     return min(count, default if columns is None else as_count(columns, "columns", 1))
 
 
