@@ -429,7 +429,7 @@ def test_rx90_is_the_example_of_the_book():
     [
         # the exercise, eq. (4.9) and (4.13)
         ("lab_rr", ["θ1 = atan2(Py, Px)", "θ1' = θ1 + π", "θ2 = atan2(RL1 - Pz, C1*Px + S1*Py)",
-                    "atan2 keeps the quadrant that arctan(y/x) loses"]),
+                    "atan2 gives the quadrant, which arctan(y/x) does not"]),
         ("lab_rrt", ["r3 = S2*(C1*Px + S1*Py) - C2*(RL1 - Pz)", "offset: q2 = θ2 - π/2."]),
         ("lab_trr", ["r1 = Py"]),
         ("rx90", ["O4 is on the axis of joint 1", "axes 4 and 6 are aligned"]),
@@ -443,12 +443,12 @@ def test_rx90_is_the_example_of_the_book():
         ({"antecedent": [0, 0, 2, 3], "sigma": [0, 0, 0, 2], "d": [0, 0.1, 0.3, 0.2],
           "alpha": [0, 0, RIGHT, 0], "theta": [0, 0, RIGHT / 2, 0], "mu": [1, 1, 1, 0]},
          ["Step 1: θ2", "Step 2: θ3", "offset: q3 = θ3 - π/4."]),
-        ("crx10ia", ["over: Raghavan"]),
-        ("panda", ["over: a locked joint (`lock` of `igm`), as the arm has no arm angle"]),
+        ("crx10ia", ["solved by Raghavan"]),
+        ("panda", ["solved by a locked joint (`lock` of `igm`), as the arm has no arm angle"]),
         ("iiwa14", ["the arm angle (`arm_angle` of `igm`), as shoulder and wrist are spherical"]),
         ({"antecedent": range(6), "sigma": [0] * 6, "alpha": [0, 1.0, 0.7, -RIGHT, RIGHT, -RIGHT],
           "d": [0, 0.3, 0.4, 0, 0, 0], "r": [0, 0.1, 0.2, 0.4, 0, 0]},
-         ["Paul's method stops here", "over: Pieper's"]),
+         ["Paul's method stops here", "solved by Pieper's"]),
     ],
 )  # fmt: skip
 def test_lines_of_explanations(name, lines):

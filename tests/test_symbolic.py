@@ -236,7 +236,7 @@ def test_new_names_are_checked():
     for symbols, message in (
         ({"D9": "x"}, "'D9' does not occur"),
         ({"RL2": "x"}, "Did you mean 'RL1'"),
-        ({"RL1": "XE"}, "two things"),
+        ({"RL1": "XE"}, "two quantities"),
         ({"RL1": "2l"}, "letters"),
         ({"RL1": 3}, "got 3"),
         ("RL1", "mapping"),
