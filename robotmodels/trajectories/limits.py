@@ -222,7 +222,7 @@ def limits_along(limits: MotionLimits, u: Array, names: tuple[str, ...] = ()) ->
         i, j = (int(k) for k in np.argwhere(zero)[0])
         what = names[j] if names else f"joint {j + 1}"
         raise InvalidValueError(
-            f"limits: the {RATES[i // 2]} of {what}, which moves, is limited to 0."
+            f"limits: the limit of {RATES[i // 2]} of {what}, which moves, is 0."
         )
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         bounds = np.where(u != 0.0, bounds / np.abs(u), np.inf)
