@@ -85,7 +85,7 @@ def test_what_no_body_has_is_reported(values, words):
     ("place", "value", "error", "words"),
     [
         (0, [-1.0], InertiaError, "Link 1: a mass cannot be negative, got -1.0 kg"),
-        (0, [1.0, 2.0], ShapeError, "for 2 masses"),
+        (0, [1.0, 2.0], ShapeError, r"com: expected shape \(2, 3\)"),
         (1, [[0.1, 0]], ShapeError, "com: expected shape"),
         (2, [np.triu(np.ones((3, 3)))], InertiaError, "must be symmetric"),
         (2, [np.full((3, 3), np.inf)], InvalidValueError, "inertia: .* got inf"),

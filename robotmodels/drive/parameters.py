@@ -8,12 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from .._arrays import LARGEST, Array, Value, as_bounded, check_same_length, read_only
+from .._arrays import LARGEST, Value, as_bounded, check_same_length, read_only
 from .._choices import chosen
 from ..errors import InertiaError, InvalidValueError
 from ..table_text import joints_text
@@ -63,7 +62,7 @@ def check_all_or_none(drive: object) -> bool:
     )
 
 
-@dataclass(frozen=True, slots=True, init=False, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class DriveParameters(Value):
     """Drive parameters of each joint, on the joint side.
 
@@ -79,19 +78,13 @@ class DriveParameters(Value):
         N. Those left out are zero; give at least one.
     """
 
-    Ia: Array
-    Fv: Array
-    Fc: Array
-    offset: Array
+    Ia: Any = None
+    Fv: Any = None
+    Fc: Any = None
+    offset: Any = None
 
-    def __init__(
-        self,
-        Ia: ArrayLike | None = None,
-        Fv: ArrayLike | None = None,
-        Fc: ArrayLike | None = None,
-        offset: ArrayLike | None = None,
-    ) -> None:
-        given = {"Ia": Ia, "Fv": Fv, "Fc": Fc, "offset": offset}
+    def __post_init__(self) -> None:
+        given = {kind.value: getattr(self, kind.value) for kind in DriveKind}
         values = {name: as_bounded(v, name, LARGEST) for name, v in given.items() if v is not None}
         if not values:
             raise InertiaError("Give at least one of Ia, Fv, Fc, offset, each of shape (n,).")
@@ -100,7 +93,7 @@ class DriveParameters(Value):
             object.__setattr__(self, name, read_only(values.get(name, zero)))
 
     def __str__(self) -> str:
-        return joints_text({key: getattr(self, key) for key in ("Ia", "Fv", "Fc", "offset")})
+        return joints_text({kind.value: getattr(self, kind.value) for kind in DriveKind})
 
     @classmethod
     def zeros(cls, n: int) -> Self:

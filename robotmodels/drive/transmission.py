@@ -6,7 +6,7 @@ Book sections 1.2.1 (q = K_c q_c + q_0) and 1.6.2.5 (joint torques from motor to
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +16,7 @@ from ..errors import InertiaError, InvalidValueError, ShapeError
 from ..table_text import joints_text
 
 
-@dataclass(frozen=True, slots=True, init=False, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class Transmission(Value):
     """Transmission between encoders (motors) and joints: ``q = K q_c + q_0``.
 
@@ -52,25 +52,17 @@ class Transmission(Value):
     ((2,), array([45., 32.]), array([1., 1.]))
     """
 
-    matrix: Array
-    offset: Array
-    Iam: Array
-    Fvm: Array
-    Fcm: Array
+    matrix: Any
+    offset: Any = None
+    Iam: Any = None
+    Fvm: Any = None
+    Fcm: Any = None
 
-    def __init__(
-        self,
-        matrix: ArrayLike,
-        offset: ArrayLike | None = None,
-        Iam: ArrayLike | None = None,
-        Fvm: ArrayLike | None = None,
-        Fcm: ArrayLike | None = None,
-    ) -> None:
-        K = _square(matrix)
-        n = len(K)
-        object.__setattr__(self, "matrix", read_only(K))
-        given = {"offset": offset, "Iam": Iam, "Fvm": Fvm, "Fcm": Fcm}
-        for name, value in given.items():
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "matrix", read_only(_square(self.matrix)))
+        n = self.n
+        for name in ("offset", "Iam", "Fvm", "Fcm"):
+            value = getattr(self, name)
             array = np.zeros(n) if value is None else as_exact(value, (n,), name)
             object.__setattr__(self, name, read_only(array))
         terms = (self.Iam != 0.0) | (self.Fvm != 0.0) | (self.Fcm != 0.0)

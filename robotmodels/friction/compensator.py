@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_each, as_floats, as_vector, read_only
+from .._arrays import Array, Value, as_each, as_floats, as_vector, read_only
 from ..errors import InvalidValueError, ShapeError
-from .models import JointFriction
+from .protocols import Summable
 
 
-@dataclass(frozen=True, slots=True, init=False, eq=False)
-class GravityCompensator(JointFriction):
+@dataclass(frozen=True, slots=True, eq=False)
+class GravityCompensator(Summable, Value):
     """Spring or hydraulic cylinder beside revolute joints: torque as a function of their angle.
 
     With known geometry it pulls a point of the link before the joint, at distance ``a`` from the
@@ -49,42 +49,32 @@ class GravityCompensator(JointFriction):
 
     needs_position: ClassVar[bool] = True
     n: int
-    joints: NDArray[np.int64]
-    a: Array | None
-    b: Array | None
-    phi: Array | None
-    values: Array
+    joints: Any
+    a: Any = None
+    b: Any = None
+    phi: Any = None
+    values: Any = None
 
-    def __init__(
-        self,
-        n: int,
-        joints: ArrayLike,
-        a: ArrayLike | None = None,
-        b: ArrayLike | None = None,
-        phi: ArrayLike | None = None,
-        values: ArrayLike | None = None,
-    ) -> None:
-        numbers = np.atleast_1d(as_floats(joints, "joints"))
-        outside = ~np.isin(numbers, np.arange(1, n + 1))
+    def __post_init__(self) -> None:
+        numbers = np.atleast_1d(as_floats(self.joints, "joints"))
+        outside = ~np.isin(numbers, np.arange(1, self.n + 1))
         if numbers.ndim != 1 or outside.any() or np.unique(numbers).size != numbers.size:
             raise InvalidValueError(
-                f"joints: expected different numbers from 1 to {n}, got {joints!r:.60}."
+                f"joints: expected different numbers from 1 to {self.n}, got {self.joints!r:.60}."
             )
-        k, geometry = numbers.size, {"a": a, "b": b, "phi": phi}
+        k, m = numbers.size, len(self.kinds)
+        set_ = object.__setattr__
+        set_(self, "n", int(self.n))
+        set_(self, "joints", read_only(numbers, np.int64))
+        geometry = {name: getattr(self, name) for name in ("a", "b", "phi")}
         if len({value is None for value in geometry.values()}) > 1:
             raise InvalidValueError(
                 "a, b, phi: expected all three, or none where the geometry is not known."
             )
-        set_ = object.__setattr__
-        set_(self, "n", int(n))
-        set_(self, "joints", read_only(numbers, np.int64))
-        for name, value in geometry.items():
+        for name, value in geometry.items() if self.a is not None else ():
             above = -np.inf if name == "phi" else 0.0
-            if value is not None:
-                value = read_only(as_each(value, k, name, above=above, finite=True))
-            set_(self, name, value)
-        m = len(self.kinds)
-        rows = np.zeros(m) if values is None else as_floats(values, "values")
+            set_(self, name, read_only(as_each(value, k, name, above=above, finite=True)))
+        rows = np.zeros(m) if self.values is None else as_floats(self.values, "values")
         if rows.shape not in ((m,), (m, k)):
             raise ShapeError(f"values: expected shape ({m},) or ({m}, {k}), got {rows.shape}.")
         set_(self, "values", read_only(np.broadcast_to(rows.reshape(m, -1), (m, k))))
@@ -108,7 +98,7 @@ class GravityCompensator(JointFriction):
             )
         v, q = np.broadcast_arrays(as_vector(v, self.n, "v"), as_vector(q, self.n, "q"))
         x = q[..., self.joints - 1]
-        if self.a is None or self.b is None or self.phi is None:
+        if self.a is None:
             return self._of_all(np.stack([np.sin(x), np.cos(x), np.sin(2 * x), np.cos(2 * x)], -2))
         x = x - self.phi
         slope = self.a * self.b * np.sin(x)

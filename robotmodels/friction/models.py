@@ -45,16 +45,14 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Rebuilt, Value, as_floats, as_vector, check_same_length, read_only
-from ..errors import InvalidValueError, ShapeError
+from .._arrays import Array, Value, as_floats, as_vector, check_same_length, read_only
+from ..errors import InvalidValueError
 from .protocols import Summable
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointFriction(Summable, Value, ABC):
-    """Base: parameters of shape (n,) that the fields name; a subclass defines `basis`."""
-
-    kinds: ClassVar[tuple[str, ...]] = ()
+class OfJoints(Value):
+    """Base: parameters of shape (n,) that the fields name."""
 
     def __post_init__(self) -> None:
         names = [field.name for field in fields(self)]
@@ -64,18 +62,29 @@ class JointFriction(Summable, Value, ABC):
             object.__setattr__(self, name, read_only(array))
 
     @property
-    def parameters(self) -> Array:
-        """Values of the parameters that the torque is linear in, shape (k, n)."""
-        return np.stack([getattr(self, kind) for kind in self.kinds])
-
-    @property
     def n(self) -> int:
         """Number of joints."""
         return getattr(self, fields(self)[0].name).size
 
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointFriction(Summable, OfJoints, ABC):
+    """Base: friction that is linear in the parameters `kinds`; a subclass defines `_columns`."""
+
+    kinds: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def parameters(self) -> Array:
+        """Values of the parameters that the torque is linear in, shape (k, n)."""
+        return np.stack([getattr(self, kind) for kind in self.kinds])
+
     @abstractmethod
+    def _columns(self, v: Array) -> tuple[Array, ...]:
+        """Torque per unit of each parameter at velocities, each (..., n)."""
+
     def basis(self, v: ArrayLike) -> Array:
         """Torque per unit of each parameter of its joint, shape (..., k, n)."""
+        return np.stack(self._columns(as_vector(v, self.n, "v")), axis=-2)
 
     def torque(self, v: ArrayLike) -> Array:
         """Torque that the joints need to overcome friction, shape (..., n)."""
@@ -89,9 +98,8 @@ class ViscousFriction(JointFriction):
     kinds: ClassVar[tuple[str, ...]] = ("Fv",)
     Fv: Any
 
-    def basis(self, v: ArrayLike) -> Array:
-        """Velocities, shape (..., 1, n)."""
-        return np.stack((as_vector(v, self.n, "v"),), axis=-2)
+    def _columns(self, v: Array) -> tuple[Array, ...]:
+        return (v,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,9 +109,8 @@ class CoulombFriction(JointFriction):
     kinds: ClassVar[tuple[str, ...]] = ("Fc",)
     Fc: Any
 
-    def basis(self, v: ArrayLike) -> Array:
-        """Signs of the velocities, shape (..., 1, n)."""
-        return np.sign(as_vector(v, self.n, "v"))[..., None, :]
+    def _columns(self, v: Array) -> tuple[Array, ...]:
+        return (np.sign(v),)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,9 +120,8 @@ class TorqueOffset(JointFriction):
     kinds: ClassVar[tuple[str, ...]] = ("offset",)
     offset: Any
 
-    def basis(self, v: ArrayLike) -> Array:
-        """Ones, shape (..., 1, n)."""
-        return np.ones_like(as_vector(v, self.n, "v"))[..., None, :]
+    def _columns(self, v: Array) -> tuple[Array, ...]:
+        return (np.ones_like(v),)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,11 +138,9 @@ class AsymmetricFriction(JointFriction):
     Fvn: Any
     Fcn: Any
 
-    def basis(self, v: ArrayLike) -> Array:
-        """Velocity and its sign in each direction, shape (..., 4, n)."""
-        v = as_vector(v, self.n, "v")
+    def _columns(self, v: Array) -> tuple[Array, ...]:
         forth, back = np.maximum(v, 0.0), np.minimum(v, 0.0)
-        return np.stack((forth, np.sign(forth), back, np.sign(back)), axis=-2)
+        return forth, np.sign(forth), back, np.sign(back)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,7 +162,7 @@ class StribeckFriction(JointFriction):
     def __post_init__(self) -> None:
         if self.exponent is None:
             object.__setattr__(self, "exponent", np.full(np.shape(self.vs), 2.0))
-        JointFriction.__post_init__(self)
+        OfJoints.__post_init__(self)
         for name in ("vs", "exponent"):
             if ((values := getattr(self, name)) <= 0.0).any():
                 raise InvalidValueError(f"{name}: expected positive numbers, got {values.min()}.")
@@ -170,17 +174,15 @@ class StribeckFriction(JointFriction):
                     f"({least[j]:g}); expected Fv >= 0 and Fs >= Fc >= 0."
                 )
 
-    def basis(self, v: ArrayLike) -> Array:
-        """Velocity, and the sign times the part of Fc and that of Fs, shape (..., 3, n)."""
-        v = as_vector(v, self.n, "v")
+    def _columns(self, v: Array) -> tuple[Array, ...]:
         with np.errstate(over="ignore", under="ignore"):  # zero far above vs
             fallen = np.exp(-((np.abs(v) / self.vs) ** self.exponent))
         sign = np.sign(v)
-        return np.stack((v, (1.0 - fallen) * sign, fallen * sign), axis=-2)
+        return v, (1.0 - fallen) * sign, fallen * sign
 
 
-@dataclass(frozen=True, slots=True, init=False, eq=False)
-class LoadFriction(Rebuilt):
+@dataclass(frozen=True, slots=True, eq=False)
+class LoadFriction(OfJoints):
     """Load-dependent dry friction of gears, ``tau = Fl |load| sign(v)``.
 
     The load is the torque that the gears carry. It depends on positions and accelerations, so that
@@ -188,18 +190,7 @@ class LoadFriction(Rebuilt):
     with a dry friction model depending on load and velocity", IEEE/RSJ IROS 2010, (9).
     """
 
-    Fl: Array
-
-    def __init__(self, Fl: ArrayLike) -> None:
-        values = as_floats(Fl, "Fl")
-        if values.ndim != 1:
-            raise ShapeError(f"Fl: expected one number for each joint, got shape {values.shape}.")
-        object.__setattr__(self, "Fl", read_only(values))
-
-    @property
-    def n(self) -> int:
-        """Number of joints."""
-        return self.Fl.size
+    Fl: Any
 
     def under_load(self, v: ArrayLike, load: ArrayLike) -> Array:
         """Torque that the joints need to overcome friction at velocities and loads (..., n)."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import LARGEST, Array, Value, as_bounded, as_core, read_only
+from .._arrays import LARGEST, Array, Value, as_bounded, as_exact, read_only
 from ..errors import InertiaError, ShapeError
 from ..geometry import DHTable
 from ..table_text import boxed
@@ -70,13 +70,8 @@ class InertialParameters(Value):
         mass = as_bounded(mass, "mass", LARGEST)
         if mass.ndim != 1:
             raise ShapeError(f"mass: expected shape (f,), got {mass.shape}.")
-        com, tensor = as_core(com, (3,), "com"), as_core(inertia, (3, 3), "inertia")
         f = mass.size
-        if com.shape != (f, 3) or tensor.shape != (f, 3, 3):
-            raise ShapeError(
-                f"expected com of shape ({f}, 3) and inertia of shape ({f}, 3, 3) for {f} masses, "
-                f"got {com.shape} and {tensor.shape}."
-            )
+        com, tensor = as_exact(com, (f, 3), "com"), as_exact(inertia, (f, 3, 3), "inertia")
         for j in np.flatnonzero(mass < 0)[:1]:
             raise InertiaError(
                 f"Link {j + 1}: a mass cannot be negative, got {mass[j]} kg. Identified sets that "
