@@ -1,12 +1,16 @@
 """Simulated arms whose real ones have geometric errors, errors of the joints, and noise."""
 
-import dataclasses
-
 import numpy as np
 from identities.random_robots import random_bodies
 
 import robotmodels as rm
-from robotmodels.calibration import KnownDistance, PointContact, Position
+from robotmodels.calibration import (
+    KnownDistance,
+    PointContact,
+    Position,
+    calibrated_model,
+    candidate_parameters,
+)
 
 ALONE = {"folds": 0, "held_out": 0}
 """A fit without its fits on part of the data."""
@@ -23,13 +27,34 @@ def slope(function, x, k, h=1e-3):
     return (16 * first[1] - first[0]) / 15
 
 
-def erroneous(model, rng, length=1e-3, angle=2e-3):
+def erroneous(model, rng):
     """A robot with errors everywhere in its table."""
-    table, f = model.table, model.f
+    table = model.table
     parallel = np.abs(np.sin(table.alpha)) < 1e-6
-    sizes = {"alpha": angle, "beta": angle * parallel, "d": length, "theta": angle, "r": length}
-    columns = {x: getattr(table, x) + size * rng.normal(size=f) for x, size in sizes.items()}
-    return model.with_table(dataclasses.replace(table, **columns))
+    sizes = {"alpha": 2e-3, "beta": 2e-3 * parallel, "d": 1e-3, "theta": 2e-3, "r": 1e-3}
+    columns = {x: getattr(table, x) + size * rng.normal(size=model.f) for x, size in sizes.items()}
+    return model.with_table(table.replace(**columns))
+
+
+def readings(model, rng, count, most=2.5):
+    """Random readings within the limits, where there are some."""
+    slides = model.table.sigma[model.table.joint_rows] == 1
+    low = np.where(np.isfinite(model.lower), model.lower, np.where(slides, -0.4, -most))
+    high = np.where(np.isfinite(model.upper), model.upper, np.where(slides, 0.5, most))
+    return rng.uniform(np.maximum(low, -most), np.minimum(high, most), (count, model.n))
+
+
+def corrections(parameters, rng, size=1e-3):
+    """Random ones; a compliance gives a fiftieth at 1 N m."""
+    xi = size * rng.normal(size=len(parameters))
+    xi[[name.startswith("compliance") for name in parameters.names]] *= 0.02
+    return xi
+
+
+def off(model, rng, size=1e-3, frames=(None,), **options):
+    """A robot with random errors in all candidates."""
+    parameters = candidate_parameters(model, frames, **options)
+    return calibrated_model(parameters, corrections(parameters, rng, size))
 
 
 def distances(lengths):
@@ -85,17 +110,13 @@ class Arm:
         p = self.poses(q)[:, :3, 3]
         return Position(q, p + noise * self.rng.normal(size=p.shape))
 
-    def touching(self, points, count):
-        """Readings at which the real tool is near points, and the number of the point of each."""
-        q, labels = [], []
-        for label, point in enumerate(points):
-            T = np.tile(np.eye(4), (4 * count, 1, 1))
-            T[:, :3, 3] = point + NOISE * self.rng.normal(size=(len(T), 3))
-            start = self.readings(len(T))
-            found = rm.igm_numeric(self.real, T, q0=start, mask="position", rng=self.rng)
-            q.append(found.q[found.valid[:, 0], 0][:count])
-            labels += [label] * len(q[-1])
-        return np.concatenate(q), labels
+    def touching(self, point, count):
+        """Readings at which the real tool is near a point."""
+        T = np.tile(np.eye(4), (4 * count, 1, 1))
+        T[:, :3, 3] = point + NOISE * self.rng.normal(size=(len(T), 3))
+        start = self.readings(len(T))
+        found = rm.igm_numeric(self.real, T, q0=start, mask="position", rng=self.rng)
+        return found.q[found.valid[:, 0], 0][:count]
 
     def touches(self, places, count, pitch=0.0):
         """Contacts with one or two points (pitch apart) at new places, and the points."""
@@ -104,9 +125,10 @@ class Arm:
             k, way = len(contacts), self.rng.normal(size=3)
             first = 0.8 * rm.dgm(self.real, self.readings(1))[0, :3, 3]
             here = np.array([first, first + pitch * way / np.linalg.norm(way)])[: 1 + (pitch > 0)]
-            q, labels = self.touching(here, count // len(here))
-            if len(q) == count // len(here) * len(here):
-                contacts.append(PointContact(q, [f"{k}:{label}" for label in labels]))
+            q = np.concatenate([self.touching(point, count // len(here)) for point in here])
+            if len(q) == count:
+                labels = np.repeat([f"{k}:{j}" for j in range(len(here))], count // len(here))
+                contacts.append(PointContact(q, labels.tolist()))
                 points.append(here)
         return contacts, np.array(points)
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from calibration_arms import slope
+from calibration_arms import corrections, off, readings, slope
 from identities.random_robots import random_model, random_pose, random_state, robot_size
 
 import robotmodels as rm
@@ -24,29 +24,9 @@ from robotmodels.calibration.extended_table import Element, extend_table
 from robotmodels.calibration.inverse import pose_errors
 from robotmodels.calibration.parameters import ErrorLaw, GeometricParameter
 from robotmodels.calibration.robot import joint_errors_of
-from robotmodels.errors import InvalidValueError
 from robotmodels.geometry import FIXED, PRISMATIC
 
 LAWS = {"gains": True, "eccentricity": True}
-
-
-def corrections(parameters, rng, size=1e-3):
-    xi = size * rng.normal(size=len(parameters))
-    # a compliance of 1 mrad at full torque
-    xi[[name.startswith("compliance") for name in parameters.names]] *= 0.02
-    return xi
-
-
-def off(model, rng, size=1e-3, **options):
-    """A robot with random errors in all candidates."""
-    parameters = candidate_parameters(model, **options)
-    return calibrated_model(parameters, corrections(parameters, rng, size))
-
-
-def readings_of(model, rng, N):
-    low = np.where(np.isfinite(model.lower), np.maximum(model.lower, -3.0), -2.0)
-    high = np.where(np.isfinite(model.upper), np.minimum(model.upper, 3.0), 2.0)
-    return rng.uniform(low, high, size=(N, model.n))
 
 
 def assert_reached(robot, solutions, T, q=None, mask=None):
@@ -61,7 +41,8 @@ def assert_reached(robot, solutions, T, q=None, mask=None):
         assert np.where(turns, np.minimum(gap, 2 * np.pi - gap), gap).max() < 1e-7
 
 
-# --- the differential model ----------------------------------------------------------------------
+# --- the differential model, and two robots -------------------------------------------------------
+
 
 STRUCTURES = {
     "serial": {"f": 6},
@@ -144,9 +125,6 @@ def test_corrections_are_a_changed_table_and_laws_changes_of_the_joint_variables
     np.testing.assert_allclose(T, rm.dgm(model, moved), atol=1e-11)
 
 
-# --- two robots ----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("seed", range(6))
 def test_two_robots_side_by_side_move_as_they_did(seed):
     rng = np.random.default_rng(seed)
@@ -169,7 +147,7 @@ def test_two_robots_side_by_side_move_as_they_did(seed):
     np.testing.assert_array_equal(pair.table.effort, np.r_[a.table.effort, b.table.effort])
 
 
-# --- the calibrated robot ---------------------------------------------------------------------
+# --- the calibrated robot and its inverse model ---------------------------------------------------
 
 
 @pytest.mark.sampled(7)
@@ -207,58 +185,73 @@ def test_the_calibrated_model_is_the_generalised_differential_model(seed):
                 np.testing.assert_allclose(rm.dgm(robot.model, actual, frame), T, **close)
 
 
-@pytest.mark.parametrize("size", [1e-3, 5e-2])
-def test_readings_are_found_again(size, rng):
-    robot = off(random_model(rng, f=6), rng, size, compliance="joints", couplings=[(4, 2)], **LAWS)
-    q = rng.uniform(-3.0, 3.0, size=(4, 5, robot.model.n))
-    errors = robot.joint_errors
-    np.testing.assert_allclose(errors.reading(errors.actual(q)), q, rtol=0, atol=1e-13)
-    assert errors.reading(q[:0]).shape == (0, *q.shape[1:])
-
-
-def test_readings_of_strong_laws_and_joint_variables_without_any():
-    # q_2 = 0.3 sin(reading) is never 0.4
+def test_readings_are_found_again(rng):
+    arm = random_model(rng, f=6)
+    for size in (1e-3, 5e-2):
+        robot = off(arm, rng, size, compliance="joints", couplings=[(4, 2)], **LAWS)
+        q = rng.uniform(-3.0, 3.0, size=(4, 5, arm.n))
+        errors = robot.joint_errors
+        np.testing.assert_allclose(errors.reading(errors.actual(q)), q, rtol=0, atol=1e-13)
+        assert errors.reading(q[:0]).shape == (0, *q.shape[1:])
+    # strong laws: q_2 = 0.3 sin(reading) is never 0.4
     parameters = candidate_parameters(rm.load("lab_rr"), **LAWS)
     names = np.array(parameters.names)
     errors = joint_errors_of(parameters, 0.3 * (names == "sine2") - (names == "gain2"))
     wanted = np.array([[0.0, 0.4], [0.0, 0.0], [0.3, 0.2]])
-    readings = errors.reading(wanted)
-    np.testing.assert_array_equal(np.isnan(readings).any(axis=1), [True, False, False])
-    np.testing.assert_allclose(errors.actual(readings[1:]), wanted[1:], rtol=0, atol=1e-13)
+    found = errors.reading(wanted)
+    np.testing.assert_array_equal(np.isnan(found).any(axis=1), [True, False, False])
+    np.testing.assert_allclose(errors.actual(found[1:]), wanted[1:], rtol=0, atol=1e-13)
 
 
-# --- the inverse model of the calibrated robot --------------------------------------------------
+REACHED = {
+    "serial": ("rx90", LAWS, 60, {}),
+    "prismatic": ("gantry", {}, 60, {}),
+    "spherical": ("stanford_arm", LAWS, 60, {}),
+    "redundant": ("panda", LAWS, 60, {}),
+    "compliance": ("panda", {"compliance": "joints", "gains": True}, 60, {}),
+    "four_axes": ("cobra_s600", LAWS, 10, {"mask": [1, 1, 1, 0, 0, 1]}),
+    "locked": ("panda", {"gains": True, "couplings": [(7, 2)]}, 10, {"lock": {6: 0.4}}),
+    "bending_links": ("erd:ur10", {"compliance": "links", "gains": True}, 8, {}),
+    "bending_isotropic": ("erd:ur10", {"compliance": "isotropic", "gains": True}, 8, {}),
+    "bending_redundant": ("panda", {"compliance": "links", "gains": True}, 8, {}),
+    "bending_uniform": ("panda", {"compliance": "uniform", "gains": True}, 8, {}),
+    **{
+        f"parts_{axes}": ("erd:ur10", {"compliance": "uniform"}, 2, {
+            "mask": [1, 1, 1, 0, 1, 1], "mask_axes": axes, "lock": {5: 0.4},
+        }) for axes in ("world", "tool")
+    },
+}  # fmt: skip
+"""Robot, errors of its joints, number of poses, and options of the inverse model."""
 
-CASES = [(name, laws) for name in ("rx90", "erd:ur10", "gantry", "panda") for laws in ({}, LAWS)]
-CASES += [("puma560", LAWS), ("stanford_arm", {}), ("cobra_s600", LAWS)]
-CASES += [("panda", {"compliance": "joints", "gains": True})]
 
-
-@pytest.mark.sampled(4)
-@pytest.mark.parametrize(("name", "laws"), CASES)
-def test_every_posture_of_the_calibrated_robot(name, laws):
-    rng = np.random.default_rng(3)
-    model = rm.load(name)
-    mask = [1, 1, 1, 0, 0, 1] if name == "cobra_s600" else None
+@pytest.mark.parametrize("case", REACHED)
+def test_readings_that_reach_poses(case, rng):
+    name, laws, count, options = REACHED[case]
+    model, mask = rm.load(name), options.get("mask")
     robot = off(model, rng, **laws)
-    q = readings_of(model, rng, 10 if mask else 60)
+    q = readings(model, rng, count, 3.0)
+    for j, value in options.get("lock", {}).items():
+        q[:, j] = value
     T = calibrated_pose(robot, q)
-    found = corrected_igm(robot, T, q_ref=q, mask=mask)
-    assert_reached(robot, found, T, q, mask)
-    # as many as the calibrated table's own inverse model finds
-    own = rm.igm(robot.model, T, q_ref=robot.joint_errors.actual(q), mask=mask)
-    assert (found.count >= own.count).mean() > 0.98
-
-
-def test_a_locked_joint_reads_what_it_is_locked_at(rng):
-    model = rm.load("panda")
-    robot = off(model, rng, gains=True, couplings=[(7, 2)])
-    q = readings_of(model, rng, 10)
-    q[:, 6] = 0.4
-    T = calibrated_pose(robot, q)
-    found = corrected_igm(robot, T, q_ref=q, lock={6: 0.4})
-    assert np.abs(found.q[found.valid][:, 6] - 0.4).max() < 1e-12
-    assert_reached(robot, found, T, q)
+    found = corrected_igm(robot, T, q_ref=q, **options)
+    assert found.valid.any(axis=-1).all()
+    assert_reached(robot, found, T, None if "mask_axes" in options else q, mask)
+    i, reading = found.valid.nonzero()[0], found.q[found.valid]
+    for j, value in options.get("lock", {}).items():
+        assert np.abs(reading[:, j] - value).max() < 1e-12
+    if "mask_axes" in options:  # the rotation that is left is about the axis not requested
+        turn = pose_errors(calibrated_pose(robot, reading), T[i])[:, 3:]
+        if options["mask_axes"] == "tool":
+            turn = np.einsum("nij,ni->nj", T[i, :3, :3], turn)
+        assert np.abs(turn[:, 1:]).max() < 3e-12
+    elif robot.bent_rows:  # more than rounding; commands are poses of the nominal robot
+        rigid = rm.dgm(robot.model, robot.joint_errors.actual(q))
+        assert np.abs(rigid - T)[:, :3, 3].max() > 1e-5
+        command = pose_offsets(robot, T, q_ref=q).command[found.valid]
+        np.testing.assert_allclose(command, rm.dgm(model, reading), rtol=0, atol=1e-15)
+    elif "lock" not in options:  # as many as the calibrated table's own inverse model finds
+        own = rm.igm(robot.model, T, q_ref=robot.joint_errors.actual(q), mask=mask)
+        assert (found.count >= own.count).mean() > 0.98
 
 
 def test_limits_are_those_of_the_readings(rng):
@@ -276,7 +269,7 @@ def test_limits_are_those_of_the_readings(rng):
 def test_a_batch_is_its_poses_one_by_one_also_at_singular_wrists(rng):
     model = rm.load("puma560")
     robot = off(model, rng, gains=True)
-    q = readings_of(model, rng, 12)
+    q = readings(model, rng, 12, 3.0)
     q[:, 4] = np.repeat([0.0, 1e-4, -1e-3], 4)
     T = calibrated_pose(robot, q).reshape(2, 6, 4, 4)
     together = corrected_igm(robot, T)
@@ -290,45 +283,6 @@ def test_a_batch_is_its_poses_one_by_one_also_at_singular_wrists(rng):
     assert empty.q.shape[0] == empty.status.size == 0
 
 
-@pytest.mark.parametrize(
-    ("name", "mode"),
-    [("erd:ur10", "links"), ("erd:ur10", "isotropic"), ("panda", "links"), ("panda", "uniform")],
-)
-def test_bending_counts_in_the_inverse_model(name, mode, rng):
-    model = rm.load(name)
-    robot = off(model, rng, compliance=mode, gains=True)
-    assert robot.bent_rows
-    q = readings_of(model, rng, 8)
-    T = calibrated_pose(robot, q)
-    # it is more than rounding, and an inverse model without it would be off by that
-    rigid = rm.dgm(robot.model, robot.joint_errors.actual(q))
-    assert np.abs(rigid - T)[:, :3, 3].max() > 1e-5
-    found = corrected_igm(robot, T, q_ref=q)
-    assert_reached(robot, found, T, q)
-    command = pose_offsets(robot, T, q_ref=q).command[found.valid]
-    there = rm.dgm(model, found.q[found.valid])
-    np.testing.assert_allclose(command, there, rtol=0, atol=1e-15)
-
-
-@pytest.mark.parametrize("axes", ["world", "tool"])
-def test_parts_of_poses_are_met_by_robots_that_bend(axes, rng):
-    model = rm.load("erd:ur10")
-    robot = off(model, rng, compliance="uniform")
-    q = readings_of(model, rng, 2)
-    q[:, 5] = 0.4
-    T = calibrated_pose(robot, q)
-    mask = [1, 1, 1, 0, 1, 1]
-    found = corrected_igm(robot, T, q_ref=q, mask=mask, mask_axes=axes, lock={5: 0.4})
-    assert found.valid.any(axis=-1).all()
-    assert_reached(robot, found, T, None, mask)
-    i, s = found.valid.nonzero()
-    # the rotation that is left is about the one axis that is not requested
-    turn = pose_errors(calibrated_pose(robot, found.q[i, s]), T[i])[:, 3:]
-    if axes == "tool":
-        turn = np.einsum("nij,ni->nj", T[i, :3, :3], turn)
-    assert np.abs(turn[:, 1:]).max() < 3e-12
-
-
 # --- controllers that keep their model ----------------------------------------------------------
 
 
@@ -336,7 +290,7 @@ def test_parts_of_poses_are_met_by_robots_that_bend(axes, rng):
 def test_false_targets_lead_to_the_true_ones(name, rng):
     model = rm.load(name)
     robot = off(model, rng, **LAWS)
-    q = readings_of(model, rng, 30)
+    q = readings(model, rng, 30, 3.0)
     q[:, 4] = np.where(np.abs(q[:, 4]) < 0.2, 0.5, q[:, 4])
     T = calibrated_pose(robot, q)
     false = pose_offsets(robot, T, q_ref=q).nearest(q)
@@ -356,7 +310,7 @@ def test_false_targets_lead_to_the_true_ones(name, rng):
 def test_constant_offsets_are_the_best_in_least_squares(name, laws, mask, rng):
     model = rm.load(name)
     robot = off(model, rng, **laws)
-    q = readings_of(model, rng, 30)
+    q = readings(model, rng, 30, 3.0)
     found = joint_offsets(robot, q, mask=mask, length=0.5)
     weight = np.array([1.0] * 3 + [0.5 if mask is None else 0.0] * 3)
 
@@ -370,9 +324,3 @@ def test_constant_offsets_are_the_best_in_least_squares(name, laws, mask, rng):
     np.testing.assert_allclose(cost(np.zeros(6)), ((weight * found.before) ** 2).sum(), rtol=1e-9)
     for step in 1e-5 * np.vstack([np.eye(6), -np.eye(6)]):
         assert cost(found.offset + step) >= least * (1 - 1e-9)
-    for call, error in (
-        (lambda: joint_offsets(robot, np.empty((0, 6))), "none"),
-        (lambda: corrected_igm(model, wanted), "CalibratedRobot"),
-    ):
-        with pytest.raises(InvalidValueError, match=error):
-            call()

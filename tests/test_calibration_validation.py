@@ -139,17 +139,6 @@ def test_all_measurements_of_one_posture_are_kept_aside_together():
         assert aside[0] == aside[2] >= aside[1]
 
 
-def test_a_run_of_postures_is_kept_aside_and_what_is_next_to_it_not_fitted():
-    arm = Arm(3)
-    q = arm.readings(60)
-    parts = parts_of(arm, [Position(q, np.zeros((60, 3)))])
-    assert sorted(b for part in parts for b in part.blocks) == list(range(60))
-    for part in parts:
-        first, last = part.blocks.min(), part.blocks.max()
-        assert part.blocks.tolist() == list(range(first, last + 1))
-        assert np.array_equal(part.training[0].q, np.r_[q[: max(first - 4, 0)], q[last + 5 :]])
-
-
 def test_notes_tell_of_measurements_that_cannot_be_held_out():
     arm = Arm(0)
     found = fit(arm.nominal, arm.sockets(1))

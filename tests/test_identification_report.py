@@ -134,6 +134,7 @@ def test_lists_of_parameters_agree_with_the_covariance(found):
     assert {c > 0.0 for *_, c in both} == {True, False}
     assert len(both) == np.triu(np.abs(C) > 0.5, k=1).sum()
     assert all(C[found.names.index(a), found.names.index(b)] == c for a, b, c in both)
+    assert abs(both[0][2]) == max(abs(c) for *_, c in both)
     white = found.details.iid_standard_errors
     np.testing.assert_allclose(standard_error_ratio(found) * white, found.standard_errors)
 
