@@ -66,3 +66,8 @@ def test_values_are_read_only_after_a_copy_too():
                 if isinstance(field, np.ndarray):
                     assert not field.flags.writeable, (type(value).__name__, name)
                     np.testing.assert_array_equal(field, getattr(value, name))
+
+
+def test_results_print_six_digits():
+    text = repr(rm.ikm(rm.load("rx90"), [0.1, -0.2, 0.3, 0.4, 0.5, 0.6], [0.1, 0, 0, 0, 0, 0]))
+    assert "v=[-0.0252038, -0.0231064, -0.203729, -0.132374, 0.209909, 0.179416]" in text

@@ -648,6 +648,10 @@ def ran(**given):
         (lambda: hybrid(selection=[0, 0, 1, 0, 0, 0]), "expected a force-controlled"),
         (lambda: hybrid(inverse="jacobian", mask=[1, 0, 0, 0, 0, 0]), "as many components"),
         (lambda: control.SpringWall([0, 0, 0], [0, 0, 0], 1.0), "normal: expected a vector"),
+        (lambda: control.SpringWall([0, 0, 0], [0, 0, 1], 1.0, bilateral="no"), "bilateral: expec"),
+        (lambda: control.AdaptiveSlotineLi(Q0, 5.0, 10.0, 1.0, model=arm()).regressor(
+            0.0, np.zeros((3, 2)), np.zeros((3, 2))), r"q: expected shape \(2,\)"),
+        (lambda: control.PIDGains(1, 2, 3, 0, 0).margin, "inertia: expected a finite number above"),
         (lambda: control.first_order(lambda s: [1, 2, 3], 1, 0, 1, 0.1), "expected one"),
         (lambda: hybrid(model=arm(masses=(0.0, 0.0))).command(0, Q0, Q0), "matrix is singular"),
         (lambda: ran(law="pid"), "law: expected a control law with command"),

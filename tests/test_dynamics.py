@@ -214,6 +214,8 @@ def test_what_is_taken_off_leaves_nothing_behind():
     loaded = with_payload(bare, *payload)
     np.testing.assert_array_equal(without_payload(loaded, *payload).inertia.values, 0.0)
     assert with_payload(bare, 0.0, [1.0, 0.0, 0.0]).inertia == bare.inertia
+    with pytest.raises(InertiaError, match=r"a payload's mass cannot be negative.*without_payload"):
+        with_payload(bare, -1.0, [0.0, 0.0, 0.0])
     # point masses are on the border of what bodies have: rounding gives no warning
     for mass in (1e-9, 1e6):
         for com in np.random.default_rng(0).normal(size=(10, 3)):

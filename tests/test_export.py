@@ -434,6 +434,7 @@ def test_what_is_refused(tmp_path):
         (lambda: export.program(rx90, "igm", geometry="symbols"), "no geometry='symbols'"),
         (lambda: export.program(rm.load("crx10ia"), "igm"), "elimination"),
         (lambda: export.program(rm.load("ur5"), "ddm", drive=False), "inertia"),
+        (lambda: export.program(rx90, "idm", wrench="no"), "wrench: expected True or False"),
         (lambda: program.code("fortran"), "'matlab'"),
         (lambda: program(np.zeros(6), np.zeros(6)), "takes 1"),
         (lambda: export.write(program, tmp_path / "no" / "folder.c"), "cannot write"),

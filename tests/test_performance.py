@@ -507,6 +507,8 @@ def test_every_path_in_a_t_region_is_followed(arm, free):
          InvalidValueError, "section='space'"),
         (lambda: pf.workspace(SLIDES, resolution=5).boundary(), InvalidValueError, "cells only"),
         (lambda: pf.feasible_path(TWO, np.eye(4)), ShapeError, "N, 4, 4"),
+        (lambda: pf.feasible_path(TWO, [np.eye(4)], through_singular="no"), InvalidValueError,
+         "through_singular: expected True or False"),
         (lambda: pf.regions(WENGER, "t", pf.workspace(TWO, resolution=5)), InvalidValueError,
          "workspace of"),
         (lambda: pf.regions(TWO, over=pf.workspace(TWO, resolution=6), limits=False),

@@ -142,6 +142,13 @@ def as_each(
     return np.broadcast_to(array, (count,)).copy()
 
 
+def as_flag(value: Any, name: str) -> bool:
+    """A choice; a word such as "no" is none."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise InvalidValueError(f"{name}: expected True or False, got {value!r:.60}.")
+    return bool(value)
+
+
 def as_count(value: Any, name: str, least: int = 1, most: int | None = None) -> int:
     """A whole number within bounds, such as a number of samples."""
     try:

@@ -99,6 +99,9 @@ def _shown(value: object) -> str:
         return value.name
     if isinstance(value, np.ndarray) and value.size > 8:
         return f"<{value.shape} array>"
+    if isinstance(value, np.ndarray) and value.dtype.kind == "f" and value.size:
+        text = np.array2string(value, separator=", ", formatter={"float": "{:.6g}".format})
+        return " ".join(text.split())
     plain = value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
     return " ".join(repr(plain).split())
 

@@ -66,6 +66,7 @@ from .._arrays import (
     Value,
     as_core,
     as_exact,
+    as_flag,
     as_floats,
     as_mask,
     as_number,
@@ -316,6 +317,7 @@ class SpringWall(Frozen, Value):
             raise InvalidValueError("normal: expected a vector that is not zero.")
         normal = normal / np.abs(normal).max()
         given: dict[str, Any] = {"normal": normal / np.linalg.norm(normal)}
+        given["bilateral"] = as_flag(self.bilateral, "bilateral")
         for name, bound in _OF_WALLS.items():
             given[name] = as_number(getattr(self, name), name, **{bound: 0.0})
         for name, value in (given | {"point": as_exact(self.point, (3,), "point")}).items():

@@ -90,7 +90,8 @@ class PIDGains(Value):
     @property
     def critical_ki(self) -> float:
         """Integral gain at the limit of stability (Routh): ``(kd + viscous) kp / inertia``."""
-        return (self.kd + self.viscous) * self.kp / self.inertia
+        inertia = as_number(self.inertia, "inertia", above=0.0)
+        return (self.kd + self.viscous) * self.kp / inertia
 
     @property
     def margin(self) -> float:
@@ -305,6 +306,7 @@ class AdaptiveSlotineLi(SurfaceLaw):
 
     def regressor(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
         """Y, shape (n, p), and s, shape (n,)."""
+        q, v = as_exact(q, (self.n,), "q"), as_exact(v, (self.n,), "v")
         v_r, a_r = self._rates(t, q, v)
         rows = (x.reshape(1, -1) for x in (q, started(v, v_r), v_r, a_r))
         return _regressors(self.model, self._chosen, *rows)[0], v_r - v

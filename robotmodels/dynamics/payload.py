@@ -119,8 +119,13 @@ def _with_body(
 def _body(mass: float, com: ArrayLike, inertia: ArrayLike | None) -> InertialParameters:
     m, point = as_exact(mass, (), "mass"), as_exact(com, (3,), "com")
     tensor = np.zeros((3, 3)) if inertia is None else as_exact(inertia, (3, 3), "inertia")
+    if m < 0.0:
+        raise InertiaError(
+            f"mass: a payload's mass cannot be negative, got {float(m)} kg; without_payload(...) "
+            "removes a body."
+        )
     # about the centre of mass, where a distant mass does not hide errors of the tensor
     central = InertialParameters.from_com(m[None], np.zeros((1, 3)), tensor[None]).consistency()
     if not central.is_physical and (m or tensor.any()):
-        raise InertiaError(f"This payload is not physical: {central.not_physical}.")
+        raise InertiaError(f"This payload is not physical: {'; '.join(central.links[0].problems)}.")
     return InertialParameters.from_com(m[None], point[None], tensor[None])

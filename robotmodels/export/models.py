@@ -8,6 +8,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from .._arrays import as_flag
 from .._choices import one_of
 from ..drive import DriveKind, Drives, drive_kinds
 from ..dynamics import ddm
@@ -166,6 +167,7 @@ def _check(kind: str, given: dict[str, Any]) -> None:
     one_of(kind, tuple(_KINDS), "kind")
     one_of(given["parameters"], ("numbers", "symbols", "base"), "parameters")
     one_of(given["geometry"], ("numbers", "symbols"), "geometry")
+    as_flag(given["wrench"], "wrench")
     for name, value in given.items():
         is_default = value is None if name == "frame" else value in ("numbers", False)
         if name not in _KINDS[kind].accepts and not is_default:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, as_mask
+from .._arrays import Array, as_flag, as_mask
 from ..errors import InvalidValueError, ShapeError
 from ..geometry import REVOLUTE
 from ..igm.loop import joint_chain
@@ -112,10 +112,8 @@ class JointSpace:
 def joint_space(model: RobotModel, limits: Any = True, free: Any = None) -> JointSpace:
     """The joint space of an arm, checked; obstacles are kept as a tuple."""
     check_model(model)
-    if not isinstance(limits, (bool, np.bool_)):
-        raise InvalidValueError(f"limits: expected True or False, got {limits!r:.60}.")
     obstacles = free if free is None or callable(free) else checked_obstacles(free)
-    return JointSpace(model, bool(limits), obstacles)
+    return JointSpace(model, as_flag(limits, "limits"), obstacles)
 
 
 def turning(model: RobotModel) -> Flags:

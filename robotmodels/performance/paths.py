@@ -42,7 +42,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_mask
+from .._arrays import Array, as_flag, as_mask
 from .._choices import one_of
 from .._outcomes import Outcome, Result
 from ..errors import ShapeError
@@ -114,6 +114,7 @@ def feasible_path(
     """Follow a path of poses from every posture of its first pose."""
     joints = joint_space(arm, limits)
     one_of(cost, COSTS, "cost")
+    as_flag(through_singular, "through_singular")
     T = poses_of(poses)
     if T.ndim != 3:
         raise ShapeError(f"poses: expected shape (N, 4, 4), got {T.shape}.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -68,10 +69,10 @@ class Moments(Feature):
             raise InvalidValueError("Moments: expected a polygon or points=, one of the two.")
         name, least = ("points", 2) if self.polygon is None else ("polygon", 3)
         corners = as_points(getattr(self, name), name, least)
-        one = isinstance(self.components, str)
-        words = (self.components,) if one else tuple(self.components)
-        known = {*words} & {*_COMPONENTS}
-        if not words or len(known) < len(words):
+        given: Any = self.components
+        one = isinstance(given, str) or not isinstance(given, Iterable)
+        words = (given,) if one else tuple(given)
+        if not words or sum(name in words for name in _COMPONENTS) < len(words):
             raise InvalidValueError(
                 f"components: expected some of {', '.join(_COMPONENTS)}, each once, got {words}."
             )

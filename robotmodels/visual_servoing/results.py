@@ -9,7 +9,16 @@ from typing import Any
 import numpy as np
 
 from .. import _arrays
-from .._arrays import LARGEST, Array, as_bounded, as_core, as_exact, as_number, read_only
+from .._arrays import (
+    LARGEST,
+    Array,
+    as_bounded,
+    as_core,
+    as_exact,
+    as_flag,
+    as_number,
+    read_only,
+)
 from .._choices import one_of
 from ..errors import InvalidValueError, ShapeError
 from ..se3 import as_single_pose
@@ -111,5 +120,5 @@ _CHECKS: dict[str, Callable[[Any, str], Any]] = {
     "object_points": as_points,
     "points": _pairs,
     "depth": _depth,
-    "kalman": lambda value, name: bool(value),
+    "kalman": as_flag,
 }

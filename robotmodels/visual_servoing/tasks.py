@@ -88,6 +88,11 @@ class Task(Checked):
     def __post_init__(self) -> None:
         self._check("gain", "interaction", "depth")
         feature: Any = as_instance(self.feature, Feature, "feature", " such as Points(...)")
+        if isinstance(self.desired, Feature | Task):
+            raise InvalidValueError(
+                f"desired: expected the measurement ({feature.size},) of {type(feature).__name__} "
+                f"or a pose (4, 4), got {type(self.desired).__name__}; give its measure(T)."
+            )
         s, is_pose = as_sensed(self.desired, feature, "desired")
         T, w, L = None, None, None
         if is_pose:

@@ -114,7 +114,7 @@ def camera_velocity(
 
 def check_kinds(task: Any, **given: tuple[Any, type]) -> None:
     """Raise for anything but a task, and for options of another kind."""
-    as_instance(getattr(task, "regulated", task), Task, "task")
+    as_instance(getattr(task, "regulated", task), Task, "task", " or Hybrid")
     for name, (value, kind) in given.items():
         if value is not None:
             as_instance(value, kind, name)

@@ -11,7 +11,7 @@ from math import pi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, Rebuilt, as_count, as_exact, read_only
+from ..._arrays import Array, Rebuilt, as_count, as_exact, as_flag, read_only
 from ..._outcomes import Outcome
 from ...errors import InvalidValueError
 from ...geometry import PRISMATIC
@@ -187,8 +187,7 @@ def nearest_singularity(
     mask = deciding_mask(model, frame, mask)
     task = singular_task(model, frame, mask, mask_axes, length)
     start = as_exact(q, (model.n,), "q")
-    if not isinstance(limits, (bool, np.bool_)):
-        raise InvalidValueError(f"limits: expected True or False, got {limits!r}.")
+    limits = as_flag(limits, "limits")
     w = np.ones(model.n) if weights is None else as_exact(weights, (model.n,), "weights")
     if not (w > 0.0).all():
         raise InvalidValueError(f"weights: expected numbers above 0, got {w.tolist()}.")
