@@ -1,4 +1,4 @@
-"""Shapes that show a robot: what a URDF gives, or a skeleton sized from the table."""
+"""Shapes that show a robot: those of a URDF, or a skeleton sized from the table."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Errors of a calibration, on the measurements of the fit and on measurements held out of it.
 
-Cross-validation leaves out whole places that are touched, or runs of successive postures: what is
-measured next to a posture of the fit resembles it, and its errors would be too small.
+Cross-validation leaves out whole places that are touched, or runs of successive postures:
+measurements next to a posture of the fit resemble it, and their errors would be too small.
 """
 
 from __future__ import annotations

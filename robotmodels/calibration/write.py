@@ -187,7 +187,7 @@ def calibrated_urdf(robot: CalibratedRobot | CalibrationResult) -> str:
     Warns
     -----
     UrdfWarning
-        Lists what a URDF has no place for, the errors of the readings among it.
+        Lists properties that a URDF cannot hold, such as errors of the readings.
 
     Examples
     --------

@@ -183,7 +183,7 @@ def _identify_tx40(folder: Path, arguments: argparse.Namespace) -> None:
     for word, row in (("here", ours), ("published, best", _PUBLISHED_RMSE)):
         print(f"  {word:16s}" + "".join(f"{error:8.2f}" for error in row))
     print(f"\n{report_sections(trained)[0].text()}\n")
-    robot = real_bodies(trained, None, asked=False)
+    robot = real_bodies(trained, None, requested=False)
     write = report(trained, last, robot).write
     for name in write(folder) if write is not None else ():
         print(f"wrote {folder.resolve() / name}")

@@ -112,7 +112,7 @@ def run(arguments: argparse.Namespace) -> Report | ExitStatus:
         return ExitStatus.NOT_REACHED
     robot = None
     if arguments.consistent or arguments.out is not None:
-        robot = real_bodies(result, bodies, asked=arguments.consistent)
+        robot = real_bodies(result, bodies, requested=arguments.consistent)
     return report(result, test, robot)
 
 
@@ -204,7 +204,7 @@ def report(
 
 
 def real_bodies(
-    result: IdentificationResult, prior: InertialParameters | None, asked: bool
+    result: IdentificationResult, prior: InertialParameters | None, requested: bool
 ) -> StandardParameters | None:
     """Physically consistent robot; unless requested, a failure is only reported."""
     from ..identification.result import consistent_robot, prior_bodies
@@ -219,7 +219,7 @@ def real_bodies(
         reason = None if robot.is_usable else f"--consistent: {robot.reason()}"
     except RobotModelsError as error:
         reason = str(error)
-    if reason is not None and asked:
+    if reason is not None and requested:
         raise InvalidValueError(reason)
     if reason is not None:
         say(f"no identified.urdf: {reason}")

@@ -181,8 +181,10 @@ def as_text(data: dict[str, Any], mask_axes: str = "world") -> str:
         f"pose of the tool (m):\n{pose_text(np.array(data['pose']))}",
     ]
     if not all(data["mask"]):
-        asked = " ".join(np.array(["x", "y", "z", "rx", "ry", "rz"])[np.array(data["mask"]) > 0])
-        lines.append(f"requested: {asked} in {mask_axes} axes")
+        requested = " ".join(
+            np.array(["x", "y", "z", "rx", "ry", "rz"])[np.array(data["mask"]) > 0]
+        )
+        lines.append(f"requested: {requested} in {mask_axes} axes")
     if rows:
         columns = [
             ("", [str(k + 1) for k in range(len(rows))]),

@@ -1,4 +1,4 @@
-"""``robotmodels info``: what a robot is made of."""
+"""``robotmodels info``: the parts of a robot."""
 
 from __future__ import annotations
 

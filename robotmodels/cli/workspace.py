@@ -1,4 +1,4 @@
-"""``robotmodels workspace``: what a robot reaches, and in how many postures."""
+"""``robotmodels workspace``: the workspace of a robot, with numbers of postures."""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ class Law(Value):
     def _keep_reference(
         self, shapes: Any = None, n: int | None = None, name: Any = "reference"
     ) -> int:
-        """Check the reference: of joints (their number is the answer), a pose or a wrench."""
+        """Check the reference: of joints (their number is returned), a pose or a wrench."""
         given = getattr(self, name)
         desired = desired_of(given, shapes, name)
         first = desired(0.0)[0]

@@ -18,7 +18,7 @@ period, delay : float, optional
     Sampling period, which laws that switch need, default continuous; time from a sample to its
     torque, s.
 noise, rng : float or array_like; int or Generator, optional
-    Standard deviation of what is measured at samples: one number for positions and velocities,
+    Standard deviations of the measured values at samples: one number for positions and velocities,
     or two, or three with that of wrenches; seed.
 **options
     ``method`` (``"Radau"`` for stiff walls), ``max_evaluations``, ``progress`` of `simulate`.

@@ -20,7 +20,7 @@ law : SlidingMode, SuperTwisting or callable
 s0 : array_like, shape (...)
     Start, of any shape: all entries are independent.
 disturbance : callable or array_like, optional
-    Function of t, or constant; its answers broadcast with s0, as the gains do.
+    Function of t, or constant; its values broadcast with s0, as the gains do.
 t, step : float
     Duration and step, s.
 

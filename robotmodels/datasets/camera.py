@@ -62,12 +62,12 @@ class CameraCalibration(Rebuilt):
 def ur10_camera() -> CameraCalibration:
     """A UR10 with a camera in its hand: 23 measured and 29 simulated poses.
 
-    The pose T of the camera is ``Z T(q) E``: Z, where the room's frame is, is about 70 mm and 2
-    degrees off, E, where the camera sits on the wrist, is unknown; both are to be estimated. The
+    The pose T of the camera is ``Z T(q) E``: Z, the pose of the room's frame, is about 70 mm and 2
+    degrees off, E, the pose of the camera on the wrist, is unknown; both are to be estimated. The
     source gives x, y, z and roll, pitch, yaw (URDF's, ``Rot(z) Rot(y) Rot(x)``), which are poses
-    here; that this order is meant was found by fits. The board's pose in the camera is what was
-    measured, so that errors of position and angle are correlated: a turn that is 0.1 degrees off is
-    0.8 mm at the camera, 0.45 m away.
+    here; that this order is meant was found by fits. The measured value is the board's pose in
+    the camera, so that errors of position and angle are correlated: a turn that is 0.1 degrees off
+    is 0.8 mm at the camera, 0.45 m away.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""A log of a Staubli TX40 at 5 kHz, and what others identified from it."""
+"""A log of a Staubli TX40 at 5 kHz, and published parameters identified from it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class PublishedParameter:
     Parameters
     ----------
     name : str
-        Of the standard parameter it stands for, as `parameter_names` writes it: "ZZ1", "Fc1".
+        Of the standard parameter, as `parameter_names` writes it: "ZZ1", "Fc1".
     expression : str
         All that is grouped in it, in the source's words.
     ols, wls : float

@@ -50,7 +50,7 @@ def beam(
 ) -> FlexibleLink:
     """Flexible link from a uniform Euler-Bernoulli beam along the x axis of its frame.
 
-    Its modes are those of the beam with what it carries: bending about y (displacement along z),
+    Its modes are those of the beam with its tip body: bending about y (displacement along z),
     about z (along y), torsion. The largest displacement of each is 1, so that elastic coordinates
     are metres, of torsion radians at the tip.
 

@@ -10,7 +10,7 @@ invariants : Invariants
 frequencies : ndarray, shape (m,)
     Of the modes, rad/s: clamped at the root, or with a free joint for ``"pinned-hub"``.
 tip : Section
-    Where what follows is fixed.
+    Section to which the next body is fixed.
 nodes, shapes : ndarray, shape (N, 3) and (N, 3, m)
     Undeformed points from root to tip, m, and their displacements by the modes.
 stiffening : bool

@@ -56,8 +56,9 @@ class FlexibleRobot(Value):
 
     Its coordinates are q (n,), the angles of the motors, and e (m,): the modes of the flexible
     links by row, then the deflections of the flexible joints. The tip section of a flexible link
-    carries what follows; where the last link is flexible and the model has no tool, the tool is the
-    end of the beam. Trees are supported; prismatic flexible links and coupled motors are refused.
+    carries the next bodies; where the last link is flexible and the model has no tool, the tool is
+    the end of the beam. Trees are supported; prismatic flexible links and coupled motors are
+    refused.
 
     Parameters
     ----------

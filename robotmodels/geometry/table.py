@@ -141,8 +141,8 @@ class DHTable:
         ----------
         rows : iterable of mappings
             Keys ``sigma, alpha, d, theta, r``; optionally ``antecedent`` (default: the row
-            before), ``mu, gamma, b, beta, name, lower, upper, velocity, effort``. What is missing
-            is 0, a missing limit is infinite.
+            before), ``mu, gamma, b, beta, name, lower, upper, velocity, effort``. Missing keys
+            are 0, missing limits infinite.
         degrees : bool
             Whether the angles (and the limits and velocities of revolute joints) are in degrees.
 
@@ -167,7 +167,7 @@ class DHTable:
         ----------
         rows : iterable of mappings
             Keys ``theta, d, a, alpha``, optionally ``sigma``, ``offset`` (added to the joint
-            variable), ``name`` and limits. What is missing is 0.
+            variable), ``name`` and limits. Missing keys are 0.
         degrees : bool
             Whether angles, offsets of revolute joints and their limits are in degrees.
 

@@ -26,18 +26,18 @@ PATH = (1e-10, 1e-10)
 class Components:
     """Requested components ``x y z rx ry rz`` of the displacement to the desired pose."""
 
-    asked: tuple[bool, ...] = (True,) * 6
+    requested: tuple[bool, ...] = (True,) * 6
     in_tool_axes: bool = False
 
     @property
     def freed_translations(self) -> tuple[int, ...]:
         """Axes along which the position is not requested."""
-        return tuple(i for i in range(3) if not self.asked[i])
+        return tuple(i for i in range(3) if not self.requested[i])
 
     @property
     def freed_rotations(self) -> tuple[int, ...]:
         """Axes about which the rotation is not requested."""
-        return tuple(i for i in range(3) if not self.asked[3 + i])
+        return tuple(i for i in range(3) if not self.requested[3 + i])
 
 
 WHOLE = Components()
@@ -66,7 +66,7 @@ class Constraints:
     @property
     def weight(self) -> Array:
         """Weights (6 + m,) of the errors: of requested components, else 0; of the relations."""
-        pose = np.where(self.components.asked, [1.0 / self.length] * 3 + [1.0] * 3, 0.0)
+        pose = np.where(self.components.requested, [1.0 / self.length] * 3 + [1.0] * 3, 0.0)
         return np.concatenate([pose, np.ones(len(self.b))])
 
     def descents(
@@ -109,7 +109,7 @@ class Constraints:
 
     def sizes(self, e: Array) -> tuple[Array, Array]:
         """Position [m] and angle [rad] that are missing, of errors (N, 6 + m), each (N,)."""
-        x, y, z, a, b, c = (e[:, :6] * self.components.asked).T
+        x, y, z, a, b, c = (e[:, :6] * self.components.requested).T
         return np.hypot(np.hypot(x, y), z), np.hypot(np.hypot(a, b), c)
 
     def met(

@@ -44,7 +44,7 @@ def prepare(chain: JointChain, components: Components = WHOLE) -> Solver | None:
     """Choose and prepare the solver of a chain for the requested components of a pose."""
     if chain.k == 0:
         return None
-    whole = all(components.asked)
+    whole = all(components.requested)
     components = WHOLE if whole else components
     if whole and chain.k == 7 and np.all(chain.columns >= 0):
         by_angle = prepare_arm_angle(chain)

@@ -52,7 +52,7 @@ def igm_numeric(
         preferred, and such joints stay at 0 (with ``limits`` at the nearest value inside them).
     rng : numpy.random.Generator or int, optional
         Generator or seed of the spread starts; default a fixed seed. The starts are the same for
-        all poses of a call, so that a batch gives what its poses give one by one.
+        all poses of a call, so that a batch has the same results as its poses one by one.
     limits : bool
         As in `igm`, with ``q0`` for ``q_ref``.
     restarts : int
@@ -103,7 +103,7 @@ def igm_numeric(
     'The position is reached, but the orientation is not available there. It is off by 180 deg.'
     """
     tolerances = options_of(model, mask_axes, limits, position_tolerance, orientation_tolerance)
-    T, asked = se3.as_pose(T), as_mask(mask)
+    T, requested = se3.as_pose(T), as_mask(mask)
     restarts = as_count(restarts, "restarts", 0)
     iterations = as_count(iterations, "iterations", 1)
     if restarts == 0 and q0 is None:
@@ -118,7 +118,7 @@ def igm_numeric(
     batch, (targets, first) = batch_rows((flat, first), ("T", "q0"))
     closest = np.clip(first, model.lower, model.upper) if limits else np.array(first)
     U = se3.inverse(model.base) @ targets.reshape(-1, 4, 4)
-    components = Components(tuple(asked.tolist()), mask_axes == "tool")
+    components = Components(tuple(requested.tolist()), mask_axes == "tool")
     effort = (tolerances, restarts, iterations)
     found = pose_search(space, components, effort, U, closest[:, columns], q0 is not None)
     closest[:, columns] = found.q
@@ -140,7 +140,7 @@ def igm_numeric(
         family_joints=family.reshape(*rows, n),
         method=METHOD,
         periodic=revolute & (not limits),
-        mask=asked,
+        mask=requested,
         error=found.error.reshape(*rows, 6),
         closest=closest.reshape(*batch, n),
     )

@@ -163,10 +163,10 @@ class _Search:
 
     def outcome(self, given: bool) -> Outcome:
         """Postures of the poses that are reached, and the reasons for the others."""
-        space, whole, asked = self.space, self.wanted.weight, self.wanted.components.asked
+        space, whole, requested = self.space, self.wanted.weight, self.wanted.components.requested
         away = self.U[:, :3, 3] - space.chain.D[0, :3, 3]
         distance = np.hypot(np.hypot(away[:, 0], away[:, 1]), away[:, 2])
-        beyond = (distance > space.reach + self.tolerances.position) & all(asked[:3])
+        beyond = (distance > space.reach + self.tolerances.position) & all(requested[:3])
         status = np.full(len(self.U), IGMStatus.NOT_CONVERGED, np.int8)
         q, limited = self.first.copy(), np.isfinite(space.limits).any()
         anywhere = np.broadcast_to(ANYWHERE, space.limits.shape)
@@ -188,7 +188,7 @@ class _Search:
             kept = met | (found is IGMStatus.REACHED)
             q[rows[kept]] = x[kept]
         rest = np.flatnonzero(status == IGMStatus.NOT_CONVERGED)
-        if rest.size and any(asked[:3]):
+        if rest.size and any(requested[:3]):
             q[rest], status[rest] = self._closest_position(rest, q[rest])
             status[beyond] = IGMStatus.TOO_FAR
         error, J = self._errors(np.arange(len(q)), q)

@@ -114,7 +114,7 @@ def prepare_reduced(
     """Prepare an arm that is not redundant for a task of fewer than six components or joints."""
     if len(components.freed_rotations) == 2:
         return _with_one_rotation(chain, components, prepare)
-    if all(components.asked):
+    if all(components.requested):
         return prepare_fewer(chain, lambda six: prepare(six, WHOLE), structured)
     if len(components.freed_rotations) == 3:
         solver = _for_position(chain, components)
@@ -237,18 +237,18 @@ def _with_one_rotation(
     # with all joints at zero: axes of parallel joints do not move
     zero = np.zeros((1, chain.k))
     axes, R = axes_of(chain, zero)[0][chain.sigma == 0, 0], tool_poses(chain, zero)[0]
-    index = int(np.flatnonzero(components.asked[3:])[0])
-    asked = R[:3, index] if components.in_tool_axes else chain.base[index, :3]
+    index = int(np.flatnonzero(components.requested[3:])[0])
+    requested = R[:3, index] if components.in_tool_axes else chain.base[index, :3]
     slides = set(components.freed_translations)
     if (
         not len(axes)
-        or np.linalg.norm(np.cross(axes, asked), axis=1).max() > 1e-9
+        or np.linalg.norm(np.cross(axes, requested), axis=1).max() > 1e-9
         or (components.in_tool_axes and not slides <= {index})
     ):
         return search
-    whole = Components((*components.asked[:3], True, True, True), components.in_tool_axes)
+    whole = Components((*components.requested[:3], True, True, True), components.in_tool_axes)
     inner = prepare(chain, whole)
-    return search if inner is None else OneAxis(chain, components, asked, inner, search)
+    return search if inner is None else OneAxis(chain, components, requested, inner, search)
 
 
 @postures.register
@@ -273,9 +273,9 @@ def _(solver: OneAxis, U: Array, references: Array, tolerances: Tolerances) -> P
 
 def is_aligned(solver: OneAxis, U: Array) -> NDArray[np.bool_]:
     """Whether the requested axis of poses is that of the arm, (N,)."""
-    index = int(np.flatnonzero(solver.components.asked[3:])[0])
-    asked = mask_axes(solver.chain, U, solver.components)[:, :, index]
-    return np.linalg.norm(np.cross(asked, solver.axis), axis=1) <= 1e-9
+    index = int(np.flatnonzero(solver.components.requested[3:])[0])
+    requested = mask_axes(solver.chain, U, solver.components)[:, :, index]
+    return np.linalg.norm(np.cross(requested, solver.axis), axis=1) <= 1e-9
 
 
 # --- fewer joints ---------------------------------------------------------------------------------

@@ -61,7 +61,7 @@ def redundant_joint(chain: JointChain, components: Components) -> int | None:
         axes = np.swapaxes(mask_axes(chain, U, components), 1, 2)
         J = scaled(jacobians(chain, q), wanted.length)
         J = np.concatenate([axes @ J[:, :3], axes @ J[:, 3:]], axis=1)
-        J = J[:, np.array(components.asked)]
+        J = J[:, np.array(components.requested)]
     _, sizes, rows = np.linalg.svd(J)
     padded = np.zeros((len(q), chain.k))
     padded[:, : sizes.shape[1]] = sizes
@@ -141,7 +141,7 @@ def free_joints(solver: Redundant) -> list[int]:
 def _too_far(solver: Redundant, U: Array) -> np.ndarray:
     """Whether positions are farther away than the arm is long."""
     chain = solver.chain
-    if chain.sigma.any() or not all(solver.components.asked[:3]):
+    if chain.sigma.any() or not all(solver.components.requested[:3]):
         return np.zeros(len(U), np.bool_)
     reach = np.linalg.norm(chain.D[1:, :3, 3], axis=1).sum()
     return np.linalg.norm(U[:, :3, 3] - chain.D[0, :3, 3], axis=1) > 1.001 * reach

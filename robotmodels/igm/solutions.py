@@ -204,8 +204,8 @@ class IGMSolutions(_Later):
         if status is IGMStatus.ORIENTATION_NOT_AVAILABLE:
             return f"{status.sentence} It is off by {angle}."
         if status is IGMStatus.NOT_CONVERGED:
-            asked = [metres] * bool(self.mask[:3].any()) + [angle] * bool(self.mask[3:].any())
-            return f"{status.sentence} The closest one misses it by {' and '.join(asked)}."
+            parts = [metres] * bool(self.mask[:3].any()) + [angle] * bool(self.mask[3:].any())
+            return f"{status.sentence} The closest one misses it by {' and '.join(parts)}."
         return status.sentence
 
     def nearest(self, q: ArrayLike) -> Array:

@@ -1,4 +1,4 @@
-"""An ellipsoid of velocities or forces as data: axes, radii, and what follows from them."""
+"""An ellipsoid of velocities or forces as data: axes, radii, and quantities derived from them."""
 
 from __future__ import annotations
 

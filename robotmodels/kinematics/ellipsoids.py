@@ -1,4 +1,4 @@
-"""Velocity and force ellipsoids: what joint velocities or torques of one size give at the tool.
+"""Velocity and force ellipsoids of the tool, of joint velocities or torques of one size.
 
 With the joints in the ball ``sum_i (v_i / s_i)^2 <= 1`` the velocities ``J v`` fill an ellipsoid
 whose axes are the left singular vectors of ``J S`` and whose radii are its singular values. The

@@ -1,4 +1,4 @@
-"""Whether the parts of a robot are what they should be, and fit each other."""
+"""Checks of the parts of a robot: types, sizes, and that they fit each other."""
 
 from __future__ import annotations
 

@@ -209,12 +209,12 @@ class RobotModel:
         ------
         UrdfError, MeshNotFoundError, FrameNotFoundError
             Malformed text, a DOCTYPE, xacro, a loop, an unsupported joint, with the element at
-            fault and what to do; a mesh that is not in the given folders; a link that is unknown.
+            fault and the remedy; a mesh that is not in the given folders; a link that is unknown.
 
         Notes
         -----
         Without ``tip_link`` the tool is the link called ``tool``. Else it is the link carried by
-        the last joint of the file, or what is fixed to it as long as that is a single link. If a
+        the last joint of the file, or the link fixed to that, as long as there is only one. If a
         hand or gripper follows the arm, the tool is the last link before it: a hand is a point
         where the chain branches into shorter moving branches, if the two longest are equal or at
         least six joints precede it. If links fixed to that last link are called ``tool0``, ``tcp``,

@@ -53,7 +53,7 @@ from . import arms
 from .arms import Flags, Ints, JointSpace
 
 LEVELS = ("position", "pose", "every_orientation")
-ANGLES, ROTATIONS = 180, 96  # orientations that stand for all, in a plane and in space
+ANGLES, ROTATIONS = 180, 96  # orientations that represent all, in a plane and in space
 _AT_A_TIME = 16384
 
 
@@ -94,9 +94,9 @@ def accessibility(
     batch, rows = poses.shape[:-2], poses.reshape(-1, 4, 4)
     components = None if mask is None else as_mask(mask)
     place = arms.PLACE if components is None else components & arms.PLACE
-    asked = components if level == "pose" else place
+    requested = components if level == "pose" else place
     first = work.part(0.0, 0.1 if level == "every_orientation" else 1.0)
-    status, count = posture_counts(space, rows, asked, first)
+    status, count = posture_counts(space, rows, requested, first)
     if level == "every_orientation":
         reached = np.flatnonzero(status == AccessStatus.ACCESSIBLE)
         status[reached], count[reached] = in_every_orientation(
@@ -178,7 +178,7 @@ def postures_of(arm: RobotModel, poses: Array, mask: Flags | None) -> tuple[Arra
 
 
 def orientations(arm: RobotModel, mask: Flags | None = None) -> Array:
-    """Orientations (K, 3, 3) that stand for all: about the requested axis, the normal, or any."""
+    """Orientations (K, 3, 3) that represent all: about the requested axis, the normal, or any."""
     from scipy.spatial.transform import Rotation
 
     normal = arms.plane_normal(arm)
@@ -205,15 +205,15 @@ def in_every_orientation(
 
     A mask without components of the orientation means all of them.
     """
-    asked = mask if mask is not None and mask[3:].any() else None
+    requested = mask if mask is not None and mask[3:].any() else None
     status = np.zeros(len(positions), np.int8)
     count = np.full(len(positions), np.iinfo(np.int64).max)
-    rest, every = np.arange(len(positions)), orientations(space.model, asked)
+    rest, every = np.arange(len(positions)), orientations(space.model, requested)
     for k, R in enumerate(every if rest.size else ()):
         T = np.tile(np.eye(4), (rest.size, 1, 1))
         T[:, :3, :3], T[:, :3, 3] = R, positions[rest]
         part = work.part(k / len(every), (k + 1) / len(every))
-        found, number = posture_counts(space, T, asked, part)
+        found, number = posture_counts(space, T, requested, part)
         count[rest] = np.minimum(count[rest], number)
         out = found == AccessStatus.OUT_OF_REACH
         status[rest] = np.where(out, AccessStatus.ORIENTATION_NOT_AVAILABLE, found)

@@ -89,8 +89,8 @@ class JointSpace:
         """
         model, turns = self.model, turning(self.model)
         bounded = np.isfinite(model.lower) & np.isfinite(model.upper) & (self.limits | ~turns)
-        asked = joint_chain(model).columns if columns is None else np.asarray(columns)
-        slides = np.intersect1d(np.flatnonzero(~turns & ~bounded), asked)
+        requested = joint_chain(model).columns if columns is None else np.asarray(columns)
+        slides = np.intersect1d(np.flatnonzero(~turns & ~bounded), requested)
         if slides.size:
             raise InvalidValueError(
                 f"{model.name}: joint {slides[0] + 1} slides without limits, so that its range is "

@@ -118,14 +118,14 @@ def feasible_path(
     T = poses_of(poses)
     if T.ndim != 3:
         raise ShapeError(f"poses: expected shape (N, 4, 4), got {T.shape}.")
-    rows, asked = arms.task_rows(arm, mask), None if mask is None else as_mask(mask)
+    rows, requested = arms.task_rows(arm, mask), None if mask is None else as_mask(mask)
     if mask is None and arms.section_arm(arm) is not None:
-        asked = arms.PLACE
+        requested = arms.PLACE
     if len(T) == 0 or not rows.any() or arms.leaves_a_family(arm, rows):
         status = PathStatus.NOT_DEFINED if len(T) else PathStatus.FOLLOWED
         q, valid = np.zeros((len(T), 0, arm.n)), np.zeros((len(T), 0), np.bool_)
     else:
-        q, valid, _ = postures_of(arm, T, asked)
+        q, valid, _ = postures_of(arm, T, requested)
         status = PathStatus.BROKEN
     following, way = Continuation(arm, rows).successors(
         T[:-1], T[1:], q[:-1], valid[:-1], q[1:], valid[1:]

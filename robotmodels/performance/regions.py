@@ -101,10 +101,10 @@ def regions(
     joints, work = joint_space(arm, limits, free), Workers(executor, progress)
     one_of(connectivity, ("n", "t"), "connectivity")
     if over is None:
-        asked: Any = {"kind": "positions" if free is None else "free", "limits": limits}
-        w = workspace(arm, free=free, resolution=20, **asked)
+        requested: Any = {"kind": "positions" if free is None else "free", "limits": limits}
+        w = workspace(arm, free=free, resolution=20, **requested)
         if w.size.size == 2:
-            w = workspace(arm, free=free, resolution=100, **asked)
+            w = workspace(arm, free=free, resolution=100, **requested)
     else:
         w = workspace_of(arm, over)
         if free is not None or (w.limits and not joints.limits):

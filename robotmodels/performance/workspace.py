@@ -249,10 +249,10 @@ def workspace(
         )
     rotation = _rotation(kind, orientation, free)
     space = space_of(joints, section, free is None and kind != "orientation", mask)
-    asked = arm, kind, joints.limits, joints.free, rows, rotation
+    requested = arm, kind, joints.limits, joints.free, rows, rotation
     if space is None:
         empty = Cells("space", np.eye(4), np.zeros((0, 3)), np.ones(3), (0, 0, 0))
-        return _workspace(asked, empty, np.zeros(0), WorkspaceStatus.NOT_DEFINED)
+        return _workspace(requested, empty, np.zeros(0), WorkspaceStatus.NOT_DEFINED)
     # a planar question to an arm in space leaves a coordinate open
     counted = _is_counted(space, arm)
     default = "space" if space.kind == "space" else "counted" if counted else "reached"
@@ -265,7 +265,7 @@ def workspace(
         count = posture_counts(joints, cells.poses(rotation), seen, work)[1]
         if arms.leaves_a_family(arm, seen):
             count, status = np.minimum(count, 1), WorkspaceStatus.REACHED_ONLY
-        return _workspace(asked, cells, count, status)
+        return _workspace(requested, cells, count, status)
     first = work if kind in ("positions", "free") else work.part(0.0, 0.1)
     if counted:
         count = _count_positions(joints, cells.world(cells.points), first)
@@ -283,10 +283,10 @@ def workspace(
         every = np.where(failed == 0, least, 0)[own]
         count = np.zeros(len(count), np.int64)
         count[reached] = every if kind == "primary" else every == 0
-    return _workspace(asked, cells, count, status)
+    return _workspace(requested, cells, count, status)
 
 
-def _workspace(asked: Any, cells: Cells, count: Any, status: WorkspaceStatus) -> Workspace:
+def _workspace(requested: Any, cells: Cells, count: Any, status: WorkspaceStatus) -> Workspace:
     """The result; empty without a cell that is reached."""
     if status is not WorkspaceStatus.NOT_DEFINED and not count.any():
         status = WorkspaceStatus.EMPTY
@@ -298,7 +298,7 @@ def _workspace(asked: Any, cells: Cells, count: Any, status: WorkspaceStatus) ->
         cells.kind,
         cells.frame,
     )
-    return Workspace(*asked, *grid, status)  # type: ignore[reportCallIssue]
+    return Workspace(*requested, *grid, status)  # type: ignore[reportCallIssue]
 
 
 def _rotation(kind: str, orientation: ArrayLike | None, free: Any) -> Array | None:

@@ -38,7 +38,7 @@ class SingularityFactor:
     unit : str
         ``"1"``, ``"m"``, ``"m^2"``, ...
     meaning : str
-        What happens in the arm, in a sentence.
+        The geometric condition in the arm, in a sentence.
     solved_joint : int or None
         Column of the joint whose value `zeros` gives; None where no joint can be solved for.
     solution, solution_latex : str

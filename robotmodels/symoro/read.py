@@ -26,7 +26,7 @@ def read_par(
     """Read a SYMORO ``.par`` file in the syntax of SYMORO+ or OpenSYMORO.
 
     The symbol in a joint's own column (theta if revolute, r if prismatic) is its variable,
-    whatever its name; what is added to it is the offset, so ``q`` is SYMORO's. All other symbols
+    whatever its name; a constant added to it is the offset, so ``q`` is SYMORO's. All other symbols
     get numbers from ``values``. Dynamic parameters that are plain symbols (``XX1``,
     ``FV2``) and are not in ``values`` are 0; a warning and the model's ``notes`` list them.
 

@@ -185,7 +185,7 @@ def _by_ruckig(states: Array, box: Array, T: float | None, waits: bool) -> Any:
     whole = np.array([[x.brake.duration] for x in profiles])
     h[:, :2] *= h[:, :2].cumsum(axis=-1) <= whole * (1.0 + 1e-12)
     polished, phases = np.empty((k, _PHASES)), np.empty((k, _PHASES, 4))
-    # where ruckig is asked for a time it meets positions to 1e-8 only
+    # with a given duration ruckig meets positions to 1e-8 only
     polished_phases(h, jerk, scaled[:3].T.copy(), scaled[3:6].T.copy(), polished, phases)
     breaks, lengths = np.zeros((k, _PHASES + 2)), np.zeros((k, _PHASES + 1))
     lengths[:, :-1] = polished * unit[:, None]

@@ -87,12 +87,12 @@ class Task:
         mask_axes: str,
         columns: NDArray[np.int64],
     ) -> None:
-        self._asked = np.ones(6, np.bool_) if mask is None else np.asarray(mask, np.bool_)
+        self._requested = np.ones(6, np.bool_) if mask is None else np.asarray(mask, np.bool_)
         self._tool, self._poses = mask_axes == "tool", T
         J = jacobian(model, q[reached], reference="local" if self._tool else "world_aligned")
         self._length = np.linalg.norm(J[:, :3], axis=-2).max(initial=0.0) or 1.0
         J[:, :3] /= self._length
-        J = J[:, self._asked][..., columns]
+        J = J[:, self._requested][..., columns]
         self.square = J.shape[-1] == J.shape[-2]
         self.conditioning, self.sign = np.full(len(q), np.nan), np.zeros(len(q))
         self._inverse = np.full((*q.shape, J.shape[-2]), np.nan)
@@ -121,7 +121,7 @@ class Task:
             twists[:, :3] = (axes @ twists[:, :3, None])[..., 0]
             twists[:, 3:] = (axes @ twists[:, 3:, None])[..., 0]
         twists[:, :3] /= self._length
-        return twists[:, self._asked]
+        return twists[:, self._requested]
 
 
 def inverted(J: Array) -> tuple[Any, Any, Any]:

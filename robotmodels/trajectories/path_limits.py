@@ -88,7 +88,7 @@ class PathLimits:
         self.scale = np.where(size > 0.0, size, 1.0)
         self.lower, self.upper = lower / self.scale, upper / self.scale
         self.rates = np.concatenate((jerk[rows], pull[self.loaded])) / self.scale
-        # accelerations at both ends of every interval, as is usual; torques if asked for
+        # accelerations at both ends of every interval, as is usual; torques if requested
         self.ends = np.repeat([1, int(both_ends)], [self.acceleration.size, self.loaded.size])
         self.names = np.array(
             [f"acceleration of joint {j + 1}" for j in self.acceleration]

@@ -115,7 +115,7 @@ def resolved_motion(
             f"got {feedback}; take more samples, or a smaller feedback."
         )
     bounds = _bounds_of_steps(limits, step)
-    asked = np.ones(6) if mask is None else np.asarray(mask, dtype=np.float64)
+    requested = np.ones(6) if mask is None else np.asarray(mask, dtype=np.float64)
     goals, twists, halfway = poses.pose(t), poses.twist(t), poses.twist(t[:-1] + 0.5 * step)
 
     def asked_of(posture: Array, twist: Array) -> IKMSolution:
@@ -137,7 +137,7 @@ def resolved_motion(
         V[k], status[k] = found.v, found.status
         q = q + step * found.v
     V[-1], status[-1] = V[-2], status[-2]
-    errors = (np.linalg.norm((behind * asked)[:, part], axis=1) for part in (_MOVE, _TURN))
+    errors = (np.linalg.norm((behind * requested)[:, part], axis=1) for part in (_MOVE, _TURN))
     return ResolvedMotion(t, Q, V, status, *errors)
 
 

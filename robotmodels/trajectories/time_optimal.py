@@ -40,7 +40,7 @@ class TimingStatus(Outcome):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class TimedPath(TimingResult):
-    """The quickest motion along a path, and what limits it.
+    """The quickest motion along a path, and the active limits.
 
     Parameters
     ----------

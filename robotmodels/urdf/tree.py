@@ -1,8 +1,8 @@
 """The text of a URDF as a checked tree of links and joints.
 
 The parser is the standard library's expat with document type declarations refused, so that entity
-bombs and external entities never reach it; it reads what kinematics and dynamics need. Meshes are
-only located here; whoever draws opens them.
+bombs and external entities never reach it; it reads the elements that kinematics and dynamics need.
+Meshes are only located here and are opened for drawing.
 """
 
 from __future__ import annotations

@@ -189,8 +189,8 @@ def _secondary(task: Hybrid, s: Array | None, T: Array | None) -> Array:
         return task.secondary
     if T is None:
         raise InvalidValueError("measurement: a secondary function needs the pose (4, 4).")
-    asked: Any = task.secondary(T.copy())
-    return as_exact(asked, (6,), "secondary(T)")
+    twist: Any = task.secondary(T.copy())
+    return as_exact(twist, (6,), "secondary(T)")
 
 
 def rate_matrix(v: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Nodes of a scene, what moves them, and shapes: floor, box, path of a tool, ellipsoids."""
+"""Nodes of a scene, their motions, and shapes: floor, box, path of a tool, ellipsoids."""
 
 from __future__ import annotations
 

@@ -105,7 +105,7 @@ class ExcitingTrajectory(Frozen):
     Parameters
     ----------
     trajectory, model, base, criterion
-        One period, n joints; the robot; the parameters to be identified; what was minimised.
+        One period, n joints; the robot; the parameters to be identified; the criterion.
     limits : ExcitationLimits
         Extremes and limits: ``kept``, ``violations()``, ``motion``, ``torque``,
         ``torque_limits``, ``clearance``.

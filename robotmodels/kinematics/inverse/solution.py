@@ -15,7 +15,7 @@ from ..._outcomes import Outcome, Result
 class IKMStatus(Outcome):
     """Outcome of an inverse kinematic model for one row; fits int8.
 
-    Joint velocities come with every status; what they miss is in the ``error`` of the result.
+    Joint velocities come with every status; the missing twist is the ``error`` of the result.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class IKMSolution(Result):
         ``J v``, the part that was requested [m/s, rad/s], and the twist minus it.
     reachable : ndarray, shape (..., 6)
         The projection of the twist onto the range of J (metres and radians compared by the
-        length): what some joint velocities produce.
+        length): the part that joint velocities can produce.
     singular_values, rank : ndarray, shapes (..., k) and (...)
         Of the scaled Jacobian, rows of ``augmented`` included, descending, and the number of them
         above 1e-10 of its norm.

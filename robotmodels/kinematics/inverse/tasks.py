@@ -18,8 +18,8 @@ mask : array_like, optional
 length : float, optional
     Metres that count as one radian; default `characteristic_length` of the frame, as in `ikm`.
 weights : array_like, shape (m,), optional
-    Positive factors that make the rows comparable; default 1. What does not fit the robot is
-    refused when the robot is known.
+    Positive factors that make the rows comparable; default 1. Arguments are
+    checked against the robot when it is known.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ class SelfMotionKind(Outcome):
 
     FINITE = 0, "The joints can move by a finite amount while the tool stays at rest."
     INFINITESIMAL = (
-        1, "The joints can only begin to move: at the second order the tool leaves its place.",
+        1, "The joints can move to first order only: at second order the tool moves, too.",
     )  # fmt: skip
     UNDECIDED = 2, "The second order allows it, but no such motion was found along it."
 
