@@ -1,6 +1,7 @@
 """Simulated arms whose real ones have geometric errors, errors of the joints, and noise."""
 
 import numpy as np
+from frozen_kinds import erroneous
 from identities.random_robots import random_bodies
 
 import robotmodels as rm
@@ -25,15 +26,6 @@ def slope(function, x, k, h=1e-3):
     table = [(function(x + s * d) - function(x - s * d)) / (2 * s) for s in (h, h / 2, h / 4)]
     first = [(4 * table[1] - table[0]) / 3, (4 * table[2] - table[1]) / 3]
     return (16 * first[1] - first[0]) / 15
-
-
-def erroneous(model, rng):
-    """A robot with errors everywhere in its table."""
-    table = model.table
-    parallel = np.abs(np.sin(table.alpha)) < 1e-6
-    sizes = {"alpha": 2e-3, "beta": 2e-3 * parallel, "d": 1e-3, "theta": 2e-3, "r": 1e-3}
-    columns = {x: getattr(table, x) + size * rng.normal(size=model.f) for x, size in sizes.items()}
-    return model.with_table(table.replace(**columns))
 
 
 def readings(model, rng, count, most=2.5):

@@ -16,6 +16,15 @@ CONTACT = {"known_lengths": ["r4"]}
 """Contacts have no length; this one of the nominal robot is right."""
 
 
+def erroneous(model, rng):
+    """A robot with errors everywhere in its table."""
+    table = model.table
+    parallel = np.abs(np.sin(table.alpha)) < 1e-6
+    sizes = {"alpha": 2e-3, "d": 1e-3, "theta": 2e-3, "r": 1e-3, "beta": 2e-3 * parallel}
+    columns = {x: getattr(table, x) + size * rng.normal(size=model.f) for x, size in sizes.items()}
+    return model.with_table(table.replace(**columns))
+
+
 class Scene:
     """The nominal robot, the real one with errors, 60 readings and the poses there with noise.
 
@@ -26,16 +35,9 @@ class Scene:
         self.rng = rng = np.random.default_rng(3)
         self.noise = 1e-4 * noise
         self.nominal = rm.load("rx90").with_tool(rm.se3.translation(0.05, -0.03, 0.11))
-        table = self.nominal.table
-        parallel = np.abs(np.sin(table.alpha)) < 1e-6
-        off = {"alpha": 2e-3, "d": 1e-3, "theta": 2e-3, "r": 1e-3, "beta": 2e-3 * parallel}
-        columns = {
-            name: getattr(table, name) + size * rng.normal(size=table.f)
-            for name, size in off.items()
-        }
-        columns["r"][3] = table.r[3]
-        tool = rm.se3.from_rpy([0.2, -0.1, 0.3], [0.05, -0.03, 0.12])
-        self.real = self.nominal.with_table(table.replace(**columns)).with_tool(tool)
+        r4, real = self.nominal.table.r[3], erroneous(self.nominal, rng)
+        real = real.with_table(real.table.replace(r=[*real.table.r[:3], r4, *real.table.r[4:]]))
+        self.real = real.with_tool(rm.se3.from_rpy([0.2, -0.1, 0.3], [0.05, -0.03, 0.12]))
         self.q = rng.uniform(-2.0, 2.0, (60, 6))
         self.T = noisy(rm.dgm(self.real, self.q), rng, self.noise)
         self.p = self.T[:, :3, 3]
@@ -160,11 +162,7 @@ def simulated_ur10():
     """Nominal UR10, readings and noisy poses of one that is off in all columns, base and tool."""
     rng = np.random.default_rng(1)
     nominal = rm.datasets.ur10_camera().model
-    table = nominal.table
-    parallel = np.abs(np.sin(table.alpha)) < 1e-6
-    off = {"alpha": 2e-3, "d": 1e-3, "theta": 2e-3, "r": 1e-3, "beta": 2e-3 * parallel}
-    columns = {k: getattr(table, k) + size * rng.normal(size=table.f) for k, size in off.items()}
-    real = nominal.with_table(table.replace(**columns))
+    real = erroneous(nominal, rng)
     real = real.with_base(rm.se3.from_rpy([0.03, -0.02, 0.05], [0.05, -0.03, 0.02]) @ real.base)
     real = real.with_tool(real.tool @ rm.se3.from_rpy([0.2, -0.1, 0.3], [0.05, -0.03, 0.12]))
     q = rng.uniform(-2.5, 2.5, (200, nominal.n))

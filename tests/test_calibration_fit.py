@@ -5,8 +5,8 @@ import pickle
 
 import numpy as np
 import pytest
-from calibration_arms import ALONE, Arm, erroneous, readings
-from frozen_kinds import KINDS, POINTS, Scene, measured, noisy, touched
+from calibration_arms import ALONE, Arm, readings
+from frozen_kinds import KINDS, POINTS, Scene, erroneous, measured, noisy, touched
 
 import robotmodels as rm
 from robotmodels.calibration import (
@@ -247,7 +247,7 @@ def test_what_the_measurements_do_not_tell_is_held_by_the_prior_or_cut():
     assert not fit(ARM, seen, prior=None, **ALONE).held_by_prior
     held = [result.names.index(name) for name in result.held_by_prior]
     assert np.abs(result.corrections[held]).max() < 5e-3
-    q = ANYWHERE.copy()
+    q, rng = ANYWHERE.copy(), np.random.default_rng(5)
     q[:, 4] = 0.3 + 1e-3 * rng.normal(size=len(q))
     cut = fit(ARM, seen_of(erroneous(ARM, rng), q, rng), truncation=1e-3, prior=None, **ALONE)
     assert cut.solution.fit.rank == len(cut.names) - 4

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from .. import se3
-from .._arrays import Array, as_vector
+from .._arrays import Array
 from ..errors import InvalidValueError
 from ..kinematics import dgm
 from ..kinematics.lengths import characteristic_length
@@ -113,17 +113,12 @@ def true_errors(robot: Any, real: Any, q: ArrayLike, frame: Frame = None) -> Tru
     """
     poses = []
     for x in (robot, real):
-        model = x if isinstance(x, RobotModel) else as_calibrated(x).model
-        readings = np.atleast_2d(as_vector(q, model.n, "q")).reshape(-1, model.n)
-        if len(readings) < 3:
-            raise InvalidValueError(
-                f"q: expected three configurations or more to fit a base, got {len(readings)}."
-            )
         is_model = isinstance(x, RobotModel)
-        poses.append(
-            dgm(x, readings, frame)
-            if is_model
-            else calibrated_pose(as_calibrated(x), readings, frame)
+        T = dgm(x, q, frame) if is_model else calibrated_pose(as_calibrated(x), q, frame)
+        poses.append(T.reshape(-1, 4, 4))
+    if len(poses[0]) < 3:
+        raise InvalidValueError(
+            f"q: expected three configurations or more to fit a base, got {len(poses[0])}."
         )
     R, p, goal = poses[0][:, :3, :3], poses[0][:, :3, 3], poses[1][:, :3, 3]
 

@@ -16,7 +16,7 @@ from ..geometry import FIXED, DHTable
 from ..inertia import InertialParameters
 from ..model import RobotModel, check_model
 from ..urdf import NamedFrame
-from .extended_table import Element, base_parameters_of
+from .extended_table import Element, six_parameters_of
 
 _SAME_GRAVITY = 1e-6
 
@@ -67,11 +67,11 @@ def combine_arms(
             "place of the second robot."
         )
     place = model_b.base if base_b is None else se3.as_single_pose(base_b, "base_b")
-    stand = base_parameters_of(se3.inverse(model_a.base) @ place)
-    rows = [stand.elements]
-    if not np.array_equal(stand.turn, np.eye(4)):
+    row, turn = six_parameters_of(se3.inverse(model_a.base) @ place, is_base=True)
+    rows = [row]
+    if not np.array_equal(turn, np.eye(4)):
         # z_0 nearly parallel to the other: the constant quarter turn is a separate frame
-        rows.insert(0, base_parameters_of(se3.rotation("x", -np.pi / 2)).elements)
+        rows.insert(0, six_parameters_of(turn, is_base=True)[0])
     table = _table(model_a.table, model_b.table, rows, (a, b))
     shift = model_a.f + len(rows)
     frames, taken = [], set(table.names)

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from math import atan2, hypot
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import se3
 from .._arrays import Array, Frozen
 from ..errors import InvalidValueError
 from ..geometry import FIXED
@@ -128,20 +126,20 @@ def extend_table(model: RobotModel, frames: Sequence[Frame] = (None,)) -> Extend
     if not frames or len(set(frames)) < len(frames):
         raise InvalidValueError(f"frames: expected one or more ends, each once, got {frames}.")
     table = model.table
-    base = base_parameters_of(model.base)
+    base, before = six_parameters_of(model.base, is_base=True)
     ends = [frame_place(model, frame) for frame in frames]
-    tools = [tool_parameters_of(pose) for _, pose in ends]
+    tools, after = zip(*(six_parameters_of(pose, is_base=False) for _, pose in ends), strict=True)
     columns = [getattr(table, element.word) for element in Element]
     fixed = [FIXED] * len(ends)
     return ExtendedTable(
         model=model,
         frames=frames,
-        nominal=np.vstack([base.elements, np.column_stack(columns), *(t.elements for t in tools)]),
+        nominal=np.vstack([base, np.column_stack(columns), *tools]),
         antecedent=np.array([-1, *table.antecedent, *(parent for parent, _ in ends)], np.int64),
         sigma=np.array([FIXED, *table.sigma, *fixed], np.int64),
         joint=np.array([-1, *model.chain.joint, *(-1 for _ in ends)], np.int64),
-        before=base.turn,
-        after=np.array([t.turn for t in tools]),
+        before=before,
+        after=np.array(after),
     )
 
 
@@ -157,13 +155,6 @@ def frame_place(model: RobotModel, frame: Frame) -> tuple[int, Array]:
 # --- the six parameters of a pose -----------------------------------------------------------------
 
 
-class SixParameters(NamedTuple):
-    """Elements (7,) of a pose with beta = 0, and the constant turn (4, 4) that goes with them."""
-
-    elements: Array
-    turn: Array
-
-
 def pose_of_elements(elements: Array) -> Array:
     """Pose of one row from its seven elements, eq. [1.3]."""
     gamma, b, beta, alpha, d, theta, r = map(float, elements)
@@ -172,26 +163,16 @@ def pose_of_elements(elements: Array) -> Array:
     return before_x @ rotation("x", alpha) @ after_x
 
 
-def base_parameters_of(base: Any) -> SixParameters:
-    """Six parameters of the base pose, ``base = turn row(elements)``, eq. [1.10].
+def six_parameters_of(pose: Array, *, is_base: bool) -> tuple[Array, Array]:
+    """Elements (7,) of a pose with beta = 0, and the constant turn (4, 4) that goes with them.
 
-    The turn is a quarter turn about x where z_0 is nearly parallel to the world's z.
+    ``pose = turn row(elements)`` of a base, ``row(elements) turn`` of a tool, eq. [1.10]. The turn
+    is a quarter turn about x where z is nearly parallel to that of the reference, else none.
     """
-    base = se3.as_single_pose(base, "base")
-    turn = _quarter_turn(base[2, 2])
-    return SixParameters(_six_elements(se3.inverse(turn) @ base), turn)
-
-
-def tool_parameters_of(tool: Any) -> SixParameters:
-    """Six parameters of a tool pose, ``tool = row(elements) turn``, eq. [1.10]."""
-    tool = se3.as_single_pose(tool, "tool")
-    turn = _quarter_turn(tool[2, 2])
-    return SixParameters(_six_elements(tool @ se3.inverse(turn)), turn)
-
-
-def _quarter_turn(cosine: float) -> Array:
-    """Identity, or a quarter turn about x where the six parameters are nearly singular."""
-    return np.eye(4) if 1.0 - cosine**2 >= _LEAST_SINE**2 else se3.rotation("x", -np.pi / 2)
+    if 1.0 - pose[2, 2] ** 2 >= _LEAST_SINE**2:
+        return _six_elements(pose), np.eye(4)
+    turn, back = rotation("x", -np.pi / 2), rotation("x", np.pi / 2)
+    return _six_elements(back @ pose if is_base else pose @ back), turn
 
 
 def _six_elements(T: Array) -> Array:
