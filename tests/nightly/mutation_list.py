@@ -1019,7 +1019,7 @@ MUTATIONS = [
         "tests/test_calibration_mistakes.py -k outliers_under_squares"),
     Mutation("calibration: measurements", "a known distance is predicted from the other side",
         "def with_contradictions(", "(length + mean)", "(length - mean)",
-        "tests/test_calibration_mistakes.py -k contradicted_by_the_lengths"),
+        "tests/test_calibration_mistakes.py -k contradicted_by_the_lengths", True),
     Mutation("calibration: measurements", "as many rows as unknowns are enough",
         "def _check_enough(", "P + F + 1 - problem.rows", "P + F - problem.rows",
         "tests/test_calibration_mistakes.py -k missing"),
