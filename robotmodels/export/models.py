@@ -100,7 +100,7 @@ def program(
         Terms of the drives, coupled motors included: all, none, or some kinds. Geometric models
         and `gravity_torque` have none.
     wrench : bool
-        Whether `idm`, `bias` and `ddm` have an input ``[f; m]`` as in `robotmodels.idm`.
+        Whether ``idm``, ``bias`` and ``ddm`` have an input ``[f; m]`` as in `robotmodels.idm`.
     frame : str or int, optional
         Of `dgm` and `jacobian`; default the tool.
 
