@@ -85,23 +85,29 @@ def ddm(
     if free is not None:
         check_follows(model, free, q, v)
         out = following_accelerations(model, free, q, v, tau, drive)
-        warn_of_negative_mass(model)
-        return out
-    from ..kernels.mass import joint_accelerations
+    else:
+        from ..kernels.mass import joint_accelerations
 
-    batch, rows = batch_rows((q, v, tau), ("q", "v", "tau"))
-    out = np.empty(rows[0].shape)
-    rotor = np.zeros((n, n)) if drives is None else np.ascontiguousarray(drives.rotor)
-    pi, gravity = model.inertia.values, model.gravity
-    failed = joint_accelerations(*rows, model.chain, pi, gravity, rotor, out)
-    if failed != -1:  # the number of a sample, or its -2 - number if the matrix is indefinite
-        sample = failed if failed >= 0 else -2 - failed
-        with np.errstate(over="ignore", invalid="ignore"):
-            M = mass_matrix(model, rows[0][sample], drive)
-        where = f" (first in sample {sample} of {len(out)})" if batch else ""
-        raise mass_matrix_error(model, M, drive, where)
-    warn_of_negative_mass(model)
-    return out.reshape(*batch, n)
+        batch, rows = batch_rows((q, v, tau), ("q", "v", "tau"))
+        out = np.empty(rows[0].shape)
+        rotor = np.zeros((n, n)) if drives is None else np.ascontiguousarray(drives.rotor)
+        bodies = model.chain, model.inertia.values, model.gravity
+        failed = joint_accelerations(*rows, *bodies, rotor, out)
+        if failed != -1:  # the number of a sample, or its -2 - number if the matrix is indefinite
+            sample = failed if failed >= 0 else -2 - failed
+            with np.errstate(over="ignore", invalid="ignore"):
+                M = mass_matrix(model, rows[0][sample], drive)
+            where = f" (first in sample {sample} of {len(out)})" if batch else ""
+            raise mass_matrix_error(model, M, drive, where)
+        out = out.reshape(*batch, n)
+    if (model.inertia.mass < 0.0).any():
+        warnings.warn(
+            f"not physical in {model.name!r}: {model.inertia.consistency().not_physical}. The mass "
+            "matrix is positive definite here; the accelerations are those of the equations.",
+            InertiaWarning,
+            stacklevel=2,
+        )
+    return out
 
 
 @lru_cache(maxsize=32)
@@ -203,14 +209,3 @@ def unit_sizes(M: Array) -> Array:
 def rounding(m: int) -> float:
     """Relative rounding of the eigenvalues of a mass matrix of unit diagonal."""
     return 4 * m * float(np.finfo(np.float64).eps)
-
-
-def warn_of_negative_mass(model: RobotModel) -> None:
-    """Warn the caller of the caller of links with negative masses."""
-    if (model.inertia.mass < 0.0).any():
-        warnings.warn(
-            f"not physical in {model.name!r}: {model.inertia.consistency().not_physical}. The mass "
-            "matrix is positive definite here; the accelerations are those of the equations.",
-            InertiaWarning,
-            stacklevel=3,
-        )

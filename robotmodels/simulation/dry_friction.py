@@ -100,29 +100,25 @@ class DryFriction:
     def loosened(self, mode: Mode, M: Array, rest: Array) -> Mode:
         """Mode after the sticking part with the largest excess of torque breaks away."""
         signs = mode.signs.copy()
-        if mode.holding is None:
-            over = self._slip_rates(mode.stuck, M, rest)
-        else:
-            middle, half = self._box(mode.stuck)
-            over = (mode.holding @ (rest - M @ mode.acceleration(M, rest)) - middle) / half
+        over = self._excess(mode, M, rest - M @ mode.acceleration(M, rest))
         first = int(np.argmax(np.abs(over)))
         signs[mode.stuck[first]] = np.sign(over[first])
         return self.mode(signs)
 
     def margin(self, mode: Mode, reaction: Array) -> float:
-        """Distance of the sticking parts from breakaway: 1 in the middle, 0 at breakaway.
+        """Distance of the sticking parts from breakaway: 1 in the middle, 0 at breakaway."""
+        return 1.0 - float(np.abs(self._excess(mode, np.eye(len(reaction)), reaction)).max())
 
-        Where torques on them are not unique, 0 as long as some within the breakaway torques exist.
+    def _excess(self, mode: Mode, M: Array, reaction: Array) -> Array:
+        """Torques on the sticking parts from the middle of their ranges, relative to the ends.
+
+        Where they are not unique: 0, or beyond +-1 by the slip rates if none are in the ranges.
         """
         if mode.holding is None:
-            rates = self._slip_rates(mode.stuck, np.eye(len(reaction)), reaction)
-            return -float(np.abs(rates).max())
-        middle, half = self._box(mode.stuck)
-        return float(np.min(1.0 - np.abs(mode.holding @ reaction - middle) / half))
-
-    def _box(self, parts: NDArray[np.int64]) -> tuple[Array, Array]:
-        low, high = self.lower[parts], self.upper[parts]
-        return 0.5 * (low + high), 0.5 * (high - low)
+            rates = self._slip_rates(mode.stuck, M, reaction)
+            return np.sign(rates) + rates
+        low, high = self.lower[mode.stuck], self.upper[mode.stuck]
+        return (mode.holding @ reaction - 0.5 * (low + high)) / (0.5 * (high - low))
 
     def _slip_rates(self, parts: NDArray[np.int64], M: Array, rest: Array) -> Array:
         """Least relative accelerations of parts at rest within the breakaway torques."""

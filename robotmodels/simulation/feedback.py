@@ -46,22 +46,30 @@ class StatefulControl(Protocol):
 
 
 class Feedback:
-    """A control law as the integration calls it: with its state, or held between samples."""
+    """A control law as the integration calls it, which integrates its state from `state0`."""
+
+    instants: tuple[float, ...] = ()
 
     def __init__(self, command: Law | None, rate: Law | None = None, state0: Array = _NONE) -> None:
-        self.command, self._rate, self._state0 = command, rate, state0
-        self.state0 = state0  # the part of the state that the integrator integrates
-        self.instants: tuple[float, ...] = ()
-        self._sampled = False
+        self.torque, self.rate, self.state0 = command, rate, state0
 
-    def sample(self, ends: tuple[float, float], period: float, delay: float, near: Array) -> None:
-        """Sample the law every `period`; each torque acts `delay` later, the first ones are zero.
+    def state(self, x: Array) -> Array:
+        """State of the law (k,), from the part that is integrated."""
+        return x
 
-        A state advances by Euler steps of one period. Instants within rounding of the times `near`
-        are these times.
-        """
+
+class Sampled(Feedback):
+    """A law that is sampled every `period`: its state advances by Euler steps of one period.
+
+    Its torques are held; each acts `delay` later, the first ones are zero. `instants` within
+    rounding of the times `near` are these times.
+    """
+
+    def __init__(
+        self, law: Feedback, ends: tuple[float, float], period: float, delay: float, near: Array
+    ) -> None:
         start, end = ends
-        if self.command is None:
+        if law.torque is None:
             raise InvalidValueError("period: there is no control to sample; give control.")
         if (end - start) / period > _MOST_SAMPLES:
             raise InvalidValueError(
@@ -80,40 +88,27 @@ class Feedback:
         taken = _snapped(start + period * k, near, tolerance)
         acts = start + period * (k + whole) + (rest if rest >= tolerance else 0.0)
         acts = _snapped(acts, near, tolerance)
-        self._taken, self._acts = deque(taken.tolist()), deque(acts[acts < end].tolist())
-        self.instants = tuple(sorted({*self._taken, *self._acts}))
-        self._period, self._sampled, self.state0 = period, True, _NONE
-        self._waiting: deque[Array] = deque()
+        super().__init__(lambda t, q, v, x: 0.0 * v if self._held is None else self._held)
+        self.instants = tuple(sorted({*taken.tolist(), *acts[acts < end].tolist()}))
+        self._samples = deque(zip(taken.tolist(), acts.tolist(), strict=True))
+        self._waiting: deque[tuple[float, Array]] = deque()
+        self._command, self._rate, self._period = law.torque, law.rate, period
         self._held: Array | None = None
-        self._state = self._next = self._state0
+        self._state = self._next = law.state0
 
     def tick(self, t: float, q: Array, v: Array) -> None:
         """Sample the law, and change the torque that is held, if this is the instant to do so."""
-        if not self._sampled:
-            return
-        if self._taken and self._taken[0] <= t:
-            self._taken.popleft()
+        if self._samples and self._samples[0][0] <= t:
             x = self._state = self._next
-            self._waiting.append(self.command(t, q, v, x))  # type: ignore[misc]
+            self._waiting.append((self._samples.popleft()[1], self._command(t, q, v, x)))
             if self._rate is not None:
                 self._next = x + self._period * self._rate(t, q, v, x)
-        while self._acts and self._acts[0] <= t:
-            self._acts.popleft()
-            self._held = self._waiting.popleft()
-
-    def torque(self, t: float, q: Array, v: Array, x: Array) -> Array | None:
-        """Torques (n,), None without control."""
-        if self._sampled:
-            return self._held
-        return None if self.command is None else self.command(t, q, v, x)
-
-    def rate(self, t: float, q: Array, v: Array, x: Array) -> Array:
-        """Time derivative of the state that is integrated."""
-        return _NONE if self._sampled or self._rate is None else self._rate(t, q, v, x)
+        while self._waiting and self._waiting[0][0] <= t:
+            self._held = self._waiting.popleft()[1]
 
     def state(self, x: Array) -> Array:
-        """State of the law (k,), from the part that is integrated."""
-        return self._state if self._sampled else x
+        """State of the law (k,) at the last sample."""
+        return self._state
 
 
 def _snapped(times: Array, near: Array, tolerance: float) -> Array:

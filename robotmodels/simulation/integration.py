@@ -18,6 +18,7 @@ from .._arrays import Array
 from .._arrays.tasks import Progress, Workers
 from ..errors import RobotModelsError
 from .dry_friction import Mode
+from .feedback import Sampled
 from .motion import Motion
 from .result import Integrator, SimulationEvent, SimulationEventKind, SimulationStatus
 
@@ -74,7 +75,8 @@ class Integration:
                 break
             # laws are evaluated before a jump only, until it is reached
             self.motion.latest = max(nextafter(end, begin), begin) if jumps else np.inf
-            control.tick(t, *np.split(y[: 2 * len(q)].copy(), 2))
+            if isinstance(control, Sampled):
+                control.tick(t, *np.split(y[: 2 * len(q)].copy(), 2))
             if not self.t or jumped:
                 y = self._decide(t, y, first=not self.t)
                 if self.times is None or self._next == t:

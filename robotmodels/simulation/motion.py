@@ -94,31 +94,28 @@ class Motion:
         q, v, x = y[:n], y[n : 2 * n], y[2 * n + 4 :]
         at = self.at(t, q, v, x)
         control, friction = at.tau @ v, (at.friction + self.offset) @ v
-        return np.concatenate(
-            [v, at.a, (control, friction, at.tool @ v, at.reaction @ self._weights)]
-            + ([self.control.rate(min(t, self.latest), q, v, x)] if x.size else [])
-        )
+        powers = control, friction, at.tool @ v, at.reaction @ self._weights
+        rate = self.control.rate(min(t, self.latest), q, v, x) if x.size else x  # type: ignore[misc]
+        return np.concatenate([v, at.a, powers, rate])
 
     def at(self, t: float, q: Array, v: Array, x: Array) -> Loads:
         """Accelerations and torques at one time; NaN accelerations where M is singular."""
         self.evaluations += 1
-        n, zero = self.n, self._zero[0]
+        n, reaction = self.n, self._zero[0]
         load, tau, friction, tool = self.load(t, q, v, x)
-        if not self.mode.stuck.size:
-            a, rows = np.empty((1, n)), (x.reshape(1, n) for x in (q, v, load))
-            # a mass matrix that is not positive definite was so at the start: singular in between
-            if self._accelerations(*rows, *self._bodies, self._gravity, self.rotor, a) != -1:
-                self.singular = True
-                a[0] = np.nan
-            return Loads(a[0], tau, friction, tool, zero)
-        M, h = self.bodies(q, v)
-        try:
-            a = self.mode.acceleration(M, load - h)
-        except np.linalg.LinAlgError:
-            self.singular = True
-            return Loads(np.full(n, np.nan), tau, friction, tool, zero)
-        reaction = load - h - M @ a
-        return Loads(a, tau, friction + reaction, tool, reaction)
+        if self.mode.stuck.size:
+            M, h = self.bodies(q, v)
+            try:
+                a = self.mode.acceleration(M, load - h)
+                reaction = load - h - M @ a
+            except np.linalg.LinAlgError:
+                a, self.singular = np.full(n, np.nan), True
+            return Loads(a, tau, friction + reaction, tool, reaction)
+        a, rows = np.empty((1, n)), (x.reshape(1, n) for x in (q, v, load))
+        # a mass matrix that is not positive definite was so at the start: singular in between
+        if self._accelerations(*rows, *self._bodies, self._gravity, self.rotor, a) != -1:
+            a[0], self.singular = np.nan, True
+        return Loads(a[0], tau, friction, tool, reaction)
 
     def bodies(self, q: Array, v: Array) -> tuple[Array, Array]:
         """Mass matrix with rotors (n, n), and torques without acceleration (n,)."""
@@ -131,9 +128,8 @@ class Motion:
     def load(self, t: float, q: Array, v: Array, x: Array) -> tuple[Array, Array, Array, Array]:
         """Torque on the bodies, of the control, of friction, and for the wrench; each (n,)."""
         time, tool = min(t, self.latest), self._zero[0]
-        tau = self.control.torque(time, q, v, x)
-        if tau is None:
-            tau = self._zero[0]
+        law = self.control.torque
+        tau = self._zero[0] if law is None else law(time, q, v, x)
         friction = self.friction(v)
         if self.placed is not None:
             friction = friction + torque_at(self.placed, v, q)

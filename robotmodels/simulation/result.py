@@ -10,14 +10,14 @@ Examples
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, Value
-from .._outcomes import Outcome
+from .._arrays import Array
+from .._outcomes import Outcome, Result
 from ..model import RobotModel
 
 _RESTS, _LEAST = 1e-6, 1e-9  # least scale of drifts: relative to the potential energy, and in J
@@ -72,7 +72,7 @@ class SimulationEvent:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Simulation(Value):
+class Simulation(Result):
     """Simulated motion of a robot. Read-only.
 
     At every sample ``M a + C v + g + offset + friction + J^T wrench = tau``.
@@ -120,11 +120,6 @@ class Simulation(Value):
     steps: int
     state: Array
 
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            if isinstance(value := getattr(self, field.name), np.ndarray):
-                value.setflags(write=False)
-
     @property
     def n(self) -> int:
         """Number of joints."""
@@ -134,10 +129,6 @@ class Simulation(Value):
     def duration(self) -> float:
         """Simulated time, s."""
         return float(self.t[-1] - self.t[0])
-
-    def reason(self) -> str:
-        """The sentence of the status."""
-        return self.status.sentence
 
     @property
     def energy(self) -> Array:

@@ -17,7 +17,7 @@ from ..errors import InvalidValueError, ShapeError
 from ..friction import Friction, check_friction
 from ..model import RobotModel, check_model
 from .dry_friction import check_dissipates
-from .feedback import Feedback, StatefulControl, checked, stateful
+from .feedback import Feedback, Sampled, StatefulControl, checked, stateful
 from .integration import Integration
 from .motion import Motion
 from .result import Integrator, Simulation
@@ -143,7 +143,7 @@ def simulate(
     wait = as_number(delay, "delay", least=0.0)
     if period is not None:
         given = jumps if times is None else np.concatenate([jumps, times])
-        law.sample((start, end), as_number(period, "period", above=0.0), wait, given)
+        law = Sampled(law, (start, end), as_number(period, "period", above=0.0), wait, given)
         knots = np.empty(0)
     elif wait:
         raise InvalidValueError("delay: only a sampled control is delayed; give period, too.")

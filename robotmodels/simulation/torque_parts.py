@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, Frozen, as_vector, batch_rows
 from ..drive import check_all_or_none
 from ..dynamics import gravity_torque
-from ..dynamics.inverse import motion_torques
+from ..dynamics.inverse import rigid_torques, wrench_torque
 from ..errors import InvalidValueError
 from ..friction import Friction, check_friction
 from ..friction.protocols import torque_at
@@ -75,24 +75,23 @@ def torque_parts(
     """
     check_model(model)
     check_all_or_none(drive)
-    n, names = model.n, ("q", "v", "a") if wrench is None else ("q", "v", "a", "wrench")
-    given = zip(names, (q, v, a, wrench), (n, n, n, 6), strict=False)
-    batch, rows = batch_rows(tuple(as_vector(x, k, name) for name, x, k in given), names)  # type: ignore[arg-type]
+    n, names = model.n, ("q", "v", "a", "wrench")
+    given = zip(names, (q, v, a, np.zeros(6) if wrench is None else wrench), strict=True)
+    motion = tuple(as_vector(x, 6 if name == "wrench" else n, name) for name, x in given)
+    batch, rows = batch_rows(motion, names)
     if not len(rows[0]):
         raise InvalidValueError("q, v, a: the motion is empty; expected at least one sample.")
-    q, v, a, *tool = (row.reshape(*batch, -1) for row in rows)
-    still = taken = pull = np.zeros_like(q)
+    q, v, a, w = (row.reshape(*batch, -1) for row in rows)
+    still = taken = np.zeros_like(q)
     # separate calls, so that no part loses digits to a larger one
     weightless = model.with_gravity(np.zeros(3))
-    inertia = motion_torques(weightless, q, still, a, drive=False)
+    inertia = rigid_torques(weightless, q, still, a)
     if drive and (drives := model.drive_matrices) is not None:
         inertia = inertia + a @ drives.rotor
         taken = drives.torque(v, None)
     if friction is not None:
         taken = taken + torque_at(check_friction(friction, n), v, q)
-    if tool:
-        pull = motion_torques(weightless, q, still, still, wrench=tool[0], drive=False)
-    coriolis = motion_torques(weightless, q, v, still, drive=False)
+    coriolis, pull = rigid_torques(weightless, q, v, still), wrench_torque(model, q, w)
     return TorqueParts(inertia, coriolis, gravity_torque(model, q), taken, pull)
 
 

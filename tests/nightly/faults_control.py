@@ -73,6 +73,6 @@ MUTATIONS = [
         "return ControlStatus.DIVERGED, (", "return ControlStatus.FOLLOWED, (", JOINTS),
     Mutation("simulation: feedback", "a sampled state is a step ahead", "def tick(self, t",
         "x = self._state = self._next", "x, self._state = self._state, self._next", FEEDBACK),
-    Mutation("simulation: feedback", "a delay rounds up to whole periods", "def sample(self, ends",
+    Mutation("simulation: feedback", "a delay rounds up to whole periods", "class Sampled(Feed",
         "rest if rest >= tolerance", "period if rest >= tolerance", FEEDBACK),
 ]  # fmt: skip
