@@ -24,6 +24,7 @@ from .inverse import rigid_torques, wrench_torque
 from .parts import mass_matrix
 
 _FOLLOWS = 1e-9  # relative to 1 + |q|: rounding of joints that follow others
+_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)  # of eigenvalues, for each joint
 _PART = 0.05  # least share of the largest joint motion of a named joint
 
 
@@ -81,10 +82,9 @@ def ddm(
         tau = tau - drives.torque(v, None)
     if wrench is not None:
         tau = tau - wrench_torque(model, q, w)
-    free = None if model.transmission is None else free_motion(model.transmission)
-    if free is not None:
-        check_follows(model, free, q, v)
-        out = following_accelerations(model, free, q, v, tau, drive)
+    K = model.transmission
+    if K is not None and (free := free_motion(K)) is not None:
+        out = following_accelerations(model, K, free, q, v, tau, drive)
     else:
         from ..kernels.mass import joint_accelerations
 
@@ -126,14 +126,14 @@ def free_motion(transmission: Transmission) -> Array | None:
     return G / np.linalg.norm(G, axis=0)
 
 
-def check_follows(model: RobotModel, free: Array, q: Array, v: Array) -> None:
-    """Raise for positions and velocities in which mimic joints do not follow their masters.
+def following_accelerations(
+    model: RobotModel, K: Transmission, free: Array, q: Array, v: Array, tau: Array, drive: bool
+) -> Array:
+    """Joint accelerations with mimic joints; raises where these do not follow their masters.
 
-    Shapes: free (n, m); q, v (..., n).
+    Shapes: free (n, m); q, v, tau (..., n) -> (..., n).
     """
-    K = model.transmission
-    offset = np.zeros(model.n) if K is None else K.offset
-    for name, values in (("q", q - offset), ("v", v)):
+    for name, values in (("q", q - K.offset), ("v", v)):
         away = np.abs(values - values @ np.linalg.pinv(free).T @ free.T)
         size = 1.0 + np.abs(values).max(axis=-1, initial=0.0, keepdims=True)
         if (away > _FOLLOWS * size).any():
@@ -143,21 +143,12 @@ def check_follows(model: RobotModel, free: Array, q: Array, v: Array) -> None:
                 f"(joint {j + 1} is off by {away[..., j].max():.3g}). Map encoder variables by "
                 "model.transmission (to_joint, matrix), or take model.with_transmission(None)."
             )
-
-
-def following_accelerations(
-    model: RobotModel, free: Array, q: Array, v: Array, tau: Array, drive: bool
-) -> Array:
-    """Joint accelerations with mimic joints.
-
-    Shapes: free (n, m); q, v, tau (..., n) -> (..., n).
-    """
     batch, (q, v, tau) = batch_rows((q, v, tau), ("q", "v", "tau"))
     rest = (tau - rigid_torques(model, q, v, np.zeros_like(q))) @ free
     M = free.T @ mass_matrix(model, q, drive) @ free
     size = unit_sizes(M)
     scaled = M / (size[:, :, None] * size[:, None, :])
-    definite = np.linalg.eigvalsh(scaled)[:, 0] > rounding(free.shape[1])
+    definite = np.linalg.eigvalsh(scaled)[:, 0] > _ROUNDING * free.shape[1]
     for i in np.flatnonzero(~definite)[:1]:
         where = f" (first in sample {i} of {len(q)})" if batch else ""
         raise mass_matrix_error(model, M[i], drive, where, free)
@@ -178,7 +169,7 @@ def mass_matrix_error(
         return SingularMassMatrixError(f"{title} singular{where}: its entries overflow. {advice}")
     m, size = len(M), unit_sizes(M)
     values, vectors = np.linalg.eigh(M / (size[:, None] * size))
-    if values[0] < -rounding(m):
+    if values[0] < -_ROUNDING * m:
         reasons = []
         if links := model.inertia.consistency().not_physical:
             reasons.append(f"Not physical: {links}.")
@@ -191,7 +182,7 @@ def mass_matrix_error(
             f"are negative. {' '.join(reasons)} Correct these parameters; standard_parameters(...) "
             "finds the nearest physical ones."
         )
-    null = vectors[:, values <= max(rounding(m), values[0])] / size[:, None]
+    null = vectors[:, values <= max(_ROUNDING * m, values[0])] / size[:, None]
     motion = np.abs(null if free is None else free @ null).max(axis=1)
     joints = [str(j + 1) for j in np.flatnonzero(motion > _PART * motion.max())]
     return SingularMassMatrixError(
@@ -204,8 +195,3 @@ def unit_sizes(M: Array) -> Array:
     """Units (..., m) in which mass matrices (..., m, m) have unit (or zero) diagonals."""
     size = np.sqrt(np.abs(np.diagonal(M, axis1=-2, axis2=-1)))
     return np.where(size > 0.0, size, 1.0)
-
-
-def rounding(m: int) -> float:
-    """Relative rounding of the eigenvalues of a mass matrix of unit diagonal."""
-    return 4 * m * float(np.finfo(np.float64).eps)

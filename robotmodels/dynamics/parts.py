@@ -30,11 +30,9 @@ Examples
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector
 from ..drive import check_all_or_none
@@ -52,8 +50,7 @@ def mass_matrix(model: RobotModel, q: ArrayLike, drive: bool = True) -> Array:
     q = as_vector(q, model.n, "q")
     twin = model.twin
     if q.ndim == 1 and twin.serves_dynamics:
-        upper = pin.crba(twin.model, twin.data(), twin.to_pin(q))
-        M = _in_table_order(model, np.where(_upper_triangle(model.n), upper, upper.T))
+        M = _in_table_order(model, pin.crba(twin.model, twin.data(), twin.to_pin(q)))
     else:
         from ..kernels.mass import mass_matrices
 
@@ -73,7 +70,7 @@ def coriolis_matrix(model: RobotModel, q: ArrayLike, v: ArrayLike) -> Array:
     twin = model.twin
     if q.ndim == v.ndim == 1 and twin.serves_dynamics:
         C = pin.computeCoriolisMatrix(twin.model, twin.data(), twin.to_pin(q), twin.to_pin(v))
-        return np.array(_in_table_order(model, C), order="C")
+        return _in_table_order(model, C)
     from ..kernels.mass import coriolis_matrices
 
     return batched(coriolis_matrices, model, {"q": q, "v": v}, (model.n, model.n))
@@ -88,13 +85,11 @@ def christoffel_blocks(model: RobotModel, q: ArrayLike) -> tuple[Array, Array]:
 
     Examples
     --------
-    >>> from robotmodels.geometry import DHTable
-    >>> from robotmodels.inertia import InertialParameters
-    >>> links = InertialParameters.from_com([1, 1], [[0.1, 0, 0]] * 2, [np.zeros((3, 3))] * 2)
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.5]), links)
-    >>> B, C = christoffel_blocks(arm, [0.0, np.pi / 2])
-    >>> B.round(12), C.round(12)
-    (array([[-0.1], [ 0. ]]), array([[ 0.  , -0.05], [ 0.05,  0.  ]]))
+    >>> from robotmodels.robots import load
+    >>> arm, q, v = load("puma560"), *np.ones((2, 6))
+    >>> (B, C), (j, k) = christoffel_blocks(arm, q), np.triu_indices(6, 1)
+    >>> bool(np.allclose(B @ (v[j] * v[k]) + C @ v**2, coriolis_matrix(arm, q, v) @ v))
+    True
     """
     from ..kernels.mass import coriolis_matrices
 
@@ -162,9 +157,9 @@ def potential_energy(model: RobotModel, q: ArrayLike) -> Array:
 
 
 def _in_table_order(model: RobotModel, M: Array) -> Array:
-    """A matrix (n, n) in Pinocchio's order of joints, in that of the table."""
+    """A copy of a matrix (n, n) in Pinocchio's order of joints, in that of the table."""
     twin = model.twin
-    return M if twin.in_table_order else M[np.ix_(twin.order, twin.order)]
+    return np.array(M if twin.in_table_order else M[np.ix_(twin.order, twin.order)], order="C")
 
 
 def _energies(model: RobotModel, q: Array, v: Array) -> Array:
@@ -172,8 +167,3 @@ def _energies(model: RobotModel, q: Array, v: Array) -> Array:
     from ..kernels.torques import energies
 
     return batched(energies, model, {"q": q, "v": v}, (2,), model.gravity)
-
-
-@lru_cache
-def _upper_triangle(n: int) -> NDArray[np.bool_]:
-    return np.triu(np.ones((n, n), dtype=bool))

@@ -125,9 +125,8 @@ def _together(*models: object) -> FrictionSum:
 
 def by_dependence(friction: Friction | None) -> tuple[Friction | None, Friction | None]:
     """The parts of a model that depend on velocities alone, and those that need positions."""
-    if friction is None:
-        return None, None
-    parts = friction.parts if isinstance(friction, FrictionSum) else (friction,)
+    single = () if friction is None else (friction,)
+    parts = friction.parts if isinstance(friction, FrictionSum) else single
     groups = [tuple(p for p in parts if needs_position(p) is placed) for placed in (False, True)]
     first, second = (FrictionSum(g) if len(g) > 1 else next(iter(g), None) for g in groups)
     return first, second

@@ -79,9 +79,7 @@ class InertialParameters(Value):
             )
         skewness = np.abs(tensor - np.swapaxes(tensor, 1, 2)).max(initial=0.0)
         if skewness > 1e-9 * np.abs(tensor).max(initial=0.0):
-            raise InertiaError(
-                "inertia: a tensor must be symmetric; check the products of inertia."
-            )
+            raise InertiaError("inertia: tensors must be symmetric; check products of inertia.")
         S = se3.skew(com)
         about_origin = tensor - mass[:, None, None] * (S @ S)
         return cls(_vectors(about_origin, mass[:, None] * com, mass))

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
+from ..drive import DriveMatrices
 from ..errors import InvalidValueError
 from ..friction import Friction
 from ..friction.protocols import torques_at_rest
@@ -62,12 +63,6 @@ class DryFriction:
     joint: NDArray[np.int64]
     motor: NDArray[np.bool_]
 
-    def joint_signs(self, signs: Array) -> Array:
-        """Direction of each joint that is a part, NaN for the others, shape (n,)."""
-        out = np.full(self.rates.shape[1], np.nan)
-        out[self.joint[~self.motor]] = signs[~self.motor]
-        return out
-
     def signs(self, v: Array) -> Array:
         """Directions of the parts, 0 for those at rest."""
         speed = self.rates @ v
@@ -77,12 +72,9 @@ class DryFriction:
     def mode(self, signs: Array) -> Mode:
         """The mode in which parts of sign 0 stick."""
         stuck = np.flatnonzero(signs == 0.0)
-        n = self.rates.shape[1]
-        if not stuck.size:
-            return Mode(signs, stuck, np.eye(n), np.zeros((0, n)))
         D = self.rates[stuck]
         _, size, Vt = np.linalg.svd(D)
-        rank = int((size > _RANK * size.max()).sum())
+        rank = int((size > _RANK * size.max(initial=0.0)).sum())
         free = np.where(np.abs(Vt[rank:]) < 1e-14, 0.0, Vt[rank:]).T.copy()
         unique = rank == stuck.size
         holding = np.asarray(np.linalg.pinv(D.T), np.float64) if unique else None
@@ -138,25 +130,24 @@ class DryFriction:
         return np.asarray(columns.T @ (b / most - columns @ best.x), np.float64)
 
 
-def dry_friction(model: RobotModel, drive: bool, friction: Friction | None) -> DryFriction:
+def dry_friction(
+    model: RobotModel, drives: DriveMatrices, friction: Friction | None
+) -> DryFriction:
     """Parts with dry friction: joints, and shafts of coupled motors."""
-    n, K = model.n, model.transmission
-    drives = model.drive_matrices if drive else None
-    coulomb = np.zeros(n) if drives is None else drives.coulomb
+    n, K, coulomb = model.n, model.transmission, drives.coulomb
     extra = torques_at_rest(friction, n)
     lower, upper = extra[0] - coulomb, extra[1] + coulomb
     joints = np.flatnonzero(lower != upper)
-    rates, levels, motors = np.zeros((0, n)), np.empty(0), np.empty(0, np.int64)
-    if drives is not None and drives.coupling.size and K is not None:
-        some = drives.coupled_coulomb != 0.0
-        rates, levels = drives.coupling[some], drives.coupled_coulomb[some]
-        motors = (np.array(K.coupled_motors) - 1)[some]
+    some = drives.coupled_coulomb != 0.0
+    rates, levels = drives.coupling[some], drives.coupled_coulomb[some]
+    coupled = K.coupled_motors if K is not None and some.size else ()
+    motors = np.array(coupled, np.int64)[some] - 1
     return DryFriction(
         rates=np.concatenate([np.eye(n)[joints], rates]),
         lower=np.concatenate([lower[joints], -levels]),
         upper=np.concatenate([upper[joints], levels]),
         drives=np.concatenate([coulomb[joints], levels]),
-        joint=np.concatenate([joints, motors]).astype(np.int64),
+        joint=np.concatenate([joints, motors]),
         motor=np.arange(joints.size + motors.size) >= joints.size,
     )
 

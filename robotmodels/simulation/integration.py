@@ -107,8 +107,7 @@ class Integration:
                     return t, np.array(y), None
                 before = float(solver.h_abs)
                 solver.step()
-                if solver.status == "failed":
-                    failed = True
+                if failed := solver.status == "failed":
                     break
                 motion.singular = False
                 self.steps += 1

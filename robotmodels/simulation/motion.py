@@ -13,14 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from .._arrays import Array
+from ..drive import DriveParameters, drive_matrices
 from ..friction import Friction
 from ..friction.protocols import SLOWEST, by_dependence, torque_at, torques_at_rest
 from ..model import RobotModel
 from .dry_friction import Mode, dry_friction
 from .feedback import Feedback
-
-Law = Callable[[float, Array, Array], Array]
-"""A wrench at time t, positions q and velocities v."""
 
 _WORLD_ALIGNED = 0  # frame code of the kernels
 
@@ -42,11 +40,11 @@ class Motion:
         self,
         model: RobotModel,
         control: Feedback,
-        wrench: Law | None,
+        wrench: Callable[..., Array] | None,
         drive: bool,
         friction: Friction | None,
         width: Array | None = None,
-        disturbance: Law | None = None,
+        disturbance: Callable[..., Array] | None = None,
     ) -> None:
         from ..kernels.mass import joint_accelerations, mass_matrices
         from ..kernels.poses import jacobians
@@ -57,13 +55,12 @@ class Motion:
         self.disturbance = disturbance
         self.extra, self.placed = by_dependence(friction)
         self.jump = torques_at_rest(friction, n)
-        self.dry = self.smooth = dry_friction(model, drive, friction)
-        if width is not None:  # no parts stick
-            self.dry = dry_friction(model, False, None)
-        drives = model.drive_matrices if drive else None
-        self.rotor = np.zeros((n, n)) if drives is None else np.ascontiguousarray(drives.rotor)
-        self.viscous = np.zeros((n, n)) if drives is None else drives.viscous
-        self.offset = np.zeros(n) if drives is None else drives.offset
+        none = drive_matrices(DriveParameters.zeros(n), None)
+        drives = (model.drive_matrices if drive else None) or none
+        self.rotor = np.ascontiguousarray(drives.rotor)
+        self.viscous, self.offset = drives.viscous, drives.offset
+        self.smooth = dry_friction(model, drives, friction)
+        self.dry = self.smooth if width is None else dry_friction(model, none, None)
         self._accelerations, self._torques = joint_accelerations, joint_torques
         self._masses, self._jacobians = mass_matrices, jacobians
         self._bodies = (model.chain, model.inertia.values)
@@ -80,7 +77,9 @@ class Motion:
         """Mode: directions of slipping parts, and sticking parts."""
         self.mode = mode
         self._dry_torque = (self.dry.drives * mode.signs) @ self.dry.rates
-        self.joint_signs = self.dry.joint_signs(mode.signs)
+        joints = ~self.dry.motor
+        self.joint_signs = np.full(self.n, np.nan)  # of joints that are no parts
+        self.joint_signs[self.dry.joint[joints]] = mode.signs[joints]
 
     def derivative(self, t: float, y: Array) -> Array:
         """Time derivative of positions, velocities, three works, reaction of friction, and control.
