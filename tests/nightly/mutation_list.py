@@ -770,7 +770,7 @@ MUTATIONS = [
         "(0.5 * (high - low))", "(high - low)",
         "tests/test_simulation.py -k (slider or breaks or stick)"),
     Mutation("simulation: dry friction", "upper bound without the drive's friction",
-        "def dry_friction(model", "extra[0] - coulomb, extra[1] + coulomb",
+        "def dry_friction(", "extra[0] - coulomb, extra[1] + coulomb",
         "extra[0] - coulomb, extra[1]",
         "tests/test_simulation.py -k (slider or breaks or stick)"),
     Mutation("simulation: events", "events are at the end of a look", "def first_below(",
