@@ -246,6 +246,7 @@ def test_joint_trajectory_is_a_quintic():
     assert np.array_equal(moved.t, t)
     assert (moved.v[0, 0], moved.q[-1, 0]) == (pytest.approx(0.5), 1.0)
     assert joint_trajectory([0.0], [1.0], 0).q.shape == (0, 1)
+    assert joint_trajectory([3.0], [1.0], [2.0, 2.0]).t.tolist() == [2.0, 2.0]
 
 
 # --- jerk-limited motions ------------------------------------------------------------------------

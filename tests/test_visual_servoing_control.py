@@ -268,6 +268,17 @@ def test_moving_targets_are_tracked():
     assert shake[0] < 0.5 * shake[1]  # the filter pays
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_noise_leaves_an_error_and_exact_measurements_none(seed):
+    rng = np.random.default_rng(seed)
+    points, gain = vs.Points(rng.uniform(-0.1, 0.1, size=(5, 3))), rng.uniform(0.3, 2.0)
+    T0 = translation(*0.03 * rng.normal(size=3)) @ GOAL @ rm.se3.from_rpy(0.2 * rng.normal(size=3))
+    options = {"duration": 10.0 / gain, "step": 0.1 / gain, "rng": seed}
+    for task in (vs.Task(points, GOAL, gain), vs.task_3d(GOAL, gain)):
+        assert vs.servo(task, T0, **options).status is S.CONVERGES
+        assert vs.servo(task, T0, noise=1e-3, **options).status is S.STEADY_ERROR
+
+
 def test_the_kalman_gain_is_the_known_one():
     """Steady gains of a constant-slope filter: alpha-beta with the tracking index."""
     tracker, h = vs.TargetMotion(process=2.0, noise=1e-3), 0.02

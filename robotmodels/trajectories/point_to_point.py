@@ -204,10 +204,9 @@ def joint_trajectory(
         t = as_floats(N, "N")  # type: ignore[arg-type]
         if t.ndim != 1 or (t[1:] < t[:-1]).any():
             raise InvalidValueError("N: expected a number of samples or times that ascend.")
-    if not t.size or t[0] == t[-1]:
-        return quintic(q0, q1, 1.0, None, v0, v1).at(0.0 * t)
-    samples = quintic(q0, q1, float(t[-1] - t[0]), None, v0, v1).at(t - t[0])
-    return replace(samples, t=t)
+    rest = t - t[:1]
+    motion = quintic(q0, q1, float(rest.max(initial=0.0)) or 1.0, None, v0, v1)
+    return replace(motion.at(rest), t=t)
 
 
 def law_motion(

@@ -114,9 +114,13 @@ class ServoMotion(Result):
     def status(self) -> ServoStatus:
         """Outcome at the end; STEADY_ERROR if an error stays although the law gives velocities."""
         size, middle = np.linalg.norm(self.error, axis=1), len(self.t) // 2
+        k = max(1, (len(size) - middle) // 2)
+        # the third and the last quarter: single samples of a noisy error differ at random
+        before, after = (np.sqrt(np.mean(x**2)) for x in (size[middle:][:k], size[-k:]))
         rate = 0.1 * self.task.regulated.gain  # the law would reduce the error ten times as fast
-        least = size[middle] * np.exp(-rate * (self.t[-1] - self.t[middle]))
-        stays = size[-1] > max(_MET, least) and self.codes[-1] == ServoStatus.CONVERGES
+        least = before * np.exp(-rate * (self.t[-k] - self.t[middle]))
+        followed = self.codes[-1] == ServoStatus.CONVERGES and size[-1] > _MET
+        stays = followed and after > max(_MET, least)
         return ServoStatus.STEADY_ERROR if stays else ServoStatus(int(self.codes[-1]))
 
     def reason(self, i: Any = ()) -> str:
