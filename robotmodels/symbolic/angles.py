@@ -27,14 +27,13 @@ class Term:
 class Angle:
     """A signed sum of joint variables, named constants and a rational multiple of pi."""
 
-    joints: tuple[Term, ...] = ()
-    constants: tuple[Term, ...] = ()
+    terms: tuple[Term, ...] = ()  # joints in order, then constants
     turns: Fraction = Fraction(0)  # multiple of pi
 
     @property
-    def terms(self) -> tuple[Term, ...]:
-        """Joint variables, then constants."""
-        return self.joints + self.constants
+    def joints(self) -> tuple[int, ...]:
+        """Numbers of the frames whose variables it holds."""
+        return tuple(t.joint for t in self.terms if t.joint)
 
     @property
     def quarters(self) -> int | None:
@@ -46,28 +45,22 @@ class Angle:
     @property
     def offset(self) -> float:
         """Value of the constant part, rad."""
-        return float(sum(t.sign * t.value for t in self.constants)) + float(self.turns) * pi
+        return float(sum(t.sign * t.value for t in self.terms)) + float(self.turns) * pi
 
     def times(self, sign: int) -> Angle:
         """The angle or its opposite."""
         if sign > 0:
             return self
-
-        def opposite(terms: tuple[Term, ...]) -> tuple[Term, ...]:
-            return tuple(replace(t, sign=-t.sign) for t in terms)
-
-        return Angle(opposite(self.joints), opposite(self.constants), -self.turns)
+        return Angle(tuple(replace(t, sign=-t.sign) for t in self.terms), -self.turns)
 
     def plus(self, other: Angle) -> Angle:
-        """The sum, joints in order."""
-        joints = tuple(sorted(self.joints + other.joints, key=lambda t: t.joint))
-        constants = self.constants + other.constants
+        """The sum; constants may add up to an exact angle, as two bends of an arm that cancel."""
+        terms = sorted(self.terms + other.terms, key=lambda t: (not t.joint, t.joint))
         turns = self.turns + other.turns
-        # Constants may add up to an exact angle, as two bends of an arm that cancel.
-        exact = exact_turns(sum(t.sign * t.value for t in constants))
+        exact = exact_turns(sum(t.sign * t.value for t in terms))
         if exact is not None:
-            constants, turns = (), turns + exact
-        return Angle(joints, constants, wrapped(turns))
+            terms, turns = [t for t in terms if t.joint], turns + exact
+        return Angle(tuple(terms), wrapped(turns))
 
     def without_quarters(self) -> Angle:
         """The angle without a constant part of right angles."""

@@ -51,12 +51,8 @@ class Move:
         return Move(self.axis, self.amount.times(-1) if self.turns else -self.amount)
 
 
-@dataclass(slots=True)
-class _Group:
-    """Successive rotations about one axis, as total angles, each followed by a translation."""
-
-    axis: int
-    stops: list[tuple[Angle, list[Any]]]
+_Group = tuple[int, list[tuple[Angle, list[Any]]]]
+"""Successive rotations about one axis, as total angles, each followed by a translation."""
 
 
 def _normal_form(
@@ -73,7 +69,7 @@ def _normal_form(
         axis = int(np.flatnonzero(image)[0])
         sign = int(image[axis])
         if not move.turns:
-            offset = groups[-1].stops[-1][1] if groups else start
+            offset = groups[-1][1][-1][1] if groups else start
             offset[axis] += sign * move.amount
             continue
         count = move.amount.quarters
@@ -81,9 +77,9 @@ def _normal_form(
             right = right @ _right_angles(move.axis, count)
             continue
         angle = move.amount.times(sign)
-        if not groups or groups[-1].axis != axis:
-            groups.append(_Group(axis, []))
-        stops = groups[-1].stops
+        if not groups or groups[-1][0] != axis:
+            groups.append((axis, []))
+        stops = groups[-1][1]
         total = stops[-1][0].plus(angle) if stops else angle
         if stops and not any(stops[-1][1]):
             stops.pop()
@@ -110,12 +106,12 @@ def multiplied_out(moves: Iterable[Move], notation: Notation) -> Any:
     start, groups, right = _normal_form(moves)
     columns = [[sympy.Integer(int(v)) for v in right[:, k]] for k in range(3)]
     point: list[Any] = [sympy.S.Zero] * 3
-    for number, group in reversed(list(enumerate(groups))):
-        *between, (angle, offset) = group.stops
-        columns = [_rotated(group.axis, angle, column, notation) for column in columns]
-        point = _rotated(group.axis, angle, _sum(offset, point), notation)
+    for number, (axis, stops) in reversed(list(enumerate(groups))):
+        *between, (angle, offset) = stops
+        columns = [_rotated(axis, angle, column, notation) for column in columns]
+        point = _rotated(axis, angle, _sum(offset, point), notation)
         for angle, offset in between:
-            point = _sum(point, _rotated(group.axis, angle, offset, notation))
+            point = _sum(point, _rotated(axis, angle, offset, notation))
         if number:
             columns = [[notation.shortened(v) for v in column] for column in columns]
             point = [notation.shortened(v) for v in point]
@@ -235,33 +231,30 @@ class Chain:
             out.append(self.parent[out[-1]])
         return out
 
-    def between(self, a: int, b: int) -> list[int]:
-        """Nodes from a to b, both included."""
-        up, down = self.ancestors(a), self.ancestors(b)
-        common = next(node for node in up if node in down)
-        return up[: up.index(common) + 1] + down[: down.index(common)][::-1]
+    def meeting(self, *nodes: int) -> int:
+        """The node where the paths between three nodes meet: the last that two descend from."""
+        lines = [self.ancestors(node) for node in nodes]
+        shared = [node for line in lines for node in line if sum(node in x for x in lines) > 1]
+        return max(shared, key=lambda node: len(self.ancestors(node)))
 
-    def meeting(self, a: int, b: int, c: int) -> int:
-        """The node where the paths between three nodes meet."""
-        third = self.between(a, c)
-        return [node for node in self.between(a, b) if node in third][-1]
+    def steps_between(self, a: int, b: int) -> list[tuple[int, bool]]:
+        """Nodes whose motions lead from a to b, and whether from their parents to them."""
+        up, down = self.ancestors(a), self.ancestors(b)
+        above = [(node, False) for node in up if node not in down]
+        return above + [(node, True) for node in reversed(down) if node not in up]
 
     def moves_between(self, a: int, b: int) -> list[Move]:
         """Elementary motions whose product is the pose of node b in node a."""
         out: list[Move] = []
-        for near, far in pairwise(self.between(a, b)):
-            if self.parent.get(far) == near:
-                out += self.moves[far]
-            else:
-                out += [move.inverse() for move in reversed(self.moves[near])]
+        for node, down in self.steps_between(a, b):
+            moves = self.moves[node]
+            out += moves if down else [move.inverse() for move in reversed(moves)]
         return out
 
     def angles_between(self, *nodes: int) -> int:
         """Number of angles on the paths between nodes, right ones not counted."""
-        steps = set()
-        for a, b in pairwise(nodes):
-            steps |= set(self.ancestors(a)) ^ set(self.ancestors(b))
-        moves = [m for node in steps if node != WORLD for m in self.moves[node]]
+        steps = {node for a, b in pairwise(nodes) for node, _ in self.steps_between(a, b)}
+        moves = [m for node in steps for m in self.moves[node]]
         return sum(m.turns and m.amount.quarters is None for m in moves)
 
     def is_short(self, *nodes: int) -> bool:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_vector
 from ..latex_text import Explanation, table_latex
 from ..model import RobotModel
-from .chain import TOOL, Chain, Move, motion_text, multiplied_out
+from .chain import TOOL, WORLD, Chain, Move, motion_text, multiplied_out
 from .explanation import Document, FormulaNumbers, frame_label
 
 
@@ -145,30 +145,24 @@ def explain_dgm(
     Py = -S1*(S23*RL4 - C2*D3)
     Pz = C23*RL4 + S2*D3
     """
-    import sympy
-
     chain = Chain(model, model.twin.frame(frame), symbols)
     notation, path, moves = chain.notation, chain.path, chain.moves
-    parent = {j: int(model.table.antecedent[j - 1]) for j in path}
 
-    def step(name: str, moves: Sequence[Move]) -> SymbolicTransform:
-        matrix = multiplied_out(moves, notation)
-        return SymbolicTransform(name, motion_text(moves, notation), matrix)
+    def step(name: str, moves: Sequence[Move], motion: str = "") -> SymbolicTransform:
+        motion = motion or motion_text(moves, notation)
+        return SymbolicTransform(name, motion, multiplied_out(moves, notation))
 
-    factors = tuple(step(f"{parent[j]}T{j}", moves[j]) for j in path)
-    products: list[SymbolicTransform] = []
-    for k in range(len(path) - 2, -1, -1):
-        before = products[-1] if products else factors[-1]
-        matrix = multiplied_out([move for j in path[k:] for move in moves[j]], notation)
-        motion = f"{factors[k].name} {before.name}"
-        products.append(SymbolicTransform(f"{parent[path[k]]}T{path[-1]}", motion, matrix))
-    product = SymbolicTransform("0T0", "1", sympy.ImmutableDenseMatrix.eye(4))
-    if path:
-        product = products[-1] if products else factors[0]
+    factors = tuple(step(f"{chain.parent[j]}T{j}", moves[j]) for j in path)
+    product = factors[-1] if path else step("0T0", [])
+    products = []
+    for factor, j in zip(factors[-2::-1], path[-2::-1], strict=True):
+        before = chain.parent[j]
+        name, motion = f"{before}T{path[-1]}", f"{factor.name} {product.name}"
+        product = step(name, chain.moves_between(before, path[-1]), motion)
+        products.append(product)
     pose = product.matrix
     if moves[0] or moves[TOOL]:
-        rows = [move for j in path for move in moves[j]]
-        pose = multiplied_out([*moves[0], *rows, *moves[TOOL]], notation)
+        pose = multiplied_out(chain.moves_between(WORLD, TOOL), notation)
     base = step("Z", moves[0]) if moves[0] else None
     tool = step("E", moves[TOOL]) if moves[TOOL] else None
     notation.check_new_names()

@@ -251,7 +251,7 @@ def _solution_text(s: _Equation, here: Array | None, chain: PolynomialChain) -> 
         a, b, c = map(notation.text, (A, B, C))
         return f"{left} = atan2({b}, {a}) ± acos(({c})/sqrt(({a})**2 + ({b})**2)){value}"
     if not s.A or not s.B:
-        value = value if angle.constants or angle.turns else ""
+        value = value if len(angle.terms) > 1 or angle.turns else ""
         return f"{left} = {'-π/2 or π/2' if s.A else '0 or π'}{value}"
     top, sign = formula(-s.A, chain), -1 if notation.text(B).startswith("-") else 1
     top, bottom = notation.text(sign * top), notation.text(sign * B)

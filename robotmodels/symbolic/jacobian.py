@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import se3
 from .._arrays import as_vector
 from ..errors import InvalidValueError
 from ..kinematics.factors import JacobianFactors, middle_frames
@@ -72,13 +71,8 @@ class JacobianExplanation(Explanation):
     def evaluate(self, q: ArrayLike) -> JacobianFactors:
         """The three matrices in numbers at q (..., n): equal to `jacobian_factors`."""
         q = as_vector(q, len(self.numbers.variables), "q")
-        rotation = np.zeros((*q.shape[:-1], 6, 6))
-        rotation[..., :3, :3] = rotation[..., 3:, 3:] = self.numbers.matrix(self.rotation, q)
-        transport = np.zeros((*q.shape[:-1], 6, 6))
-        transport[..., range(6), range(6)] = 1.0
-        transport[..., :3, 3:] = -se3.skew(self.numbers.matrix(self.lever, q)[..., 0])
-        reduced = self.numbers.matrix(self.reduced, q)
-        return JacobianFactors(rotation, transport, reduced, self.projection, self.intermediate)
+        factors = (self.numbers.matrix(M, q) for M in (self.first, self.second, self.reduced))
+        return JacobianFactors(*factors, self.projection, self.intermediate)
 
     def __repr__(self) -> str:
         return f"<JacobianExplanation of {self.robot}: {self.projection}, {self.intermediate}>"

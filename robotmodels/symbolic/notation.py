@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 from ..errors import InvalidValueError, nearest_names
@@ -96,7 +95,7 @@ class Notation:
         if exact is not None:
             return Angle(turns=wrapped(exact))
         symbol = self._constant(name, latex, value, "rad", meaning)
-        return Angle((), (Term(symbol, name, value=value),))
+        return Angle((Term(symbol, name, value=value),))
 
     def length(self, name: str, latex: str, value: float, meaning: str) -> Any:
         """A constant length: 0, or a symbol."""
@@ -120,10 +119,9 @@ class Notation:
         angle = angle.times(sign)
         if not angle.terms:
             return sympy.cos(sympy.pi * angle.turns), sympy.sin(sympy.pi * angle.turns)
-        quarters = int(angle.turns * 2) if (angle.turns * 2).denominator == 1 else 0
-        rest = angle.turns - Fraction(quarters, 2)
-        C, S = self._named_cos_sin(Angle(angle.joints, angle.constants, rest))
-        for _ in range(quarters % 4):
+        rest = angle.without_quarters()
+        C, S = self._named_cos_sin(rest)
+        for _ in range(int(2 * (angle.turns - rest.turns)) % 4):
             C, S = -S, C
         return C, sign * S
 
@@ -138,7 +136,7 @@ class Notation:
         if f"C{letters}" not in self._symbols:
             total = sympy.pi * angle.turns + sum(t.sign * t.symbol for t in angle.terms)
             moving = bool(angle.joints)
-            rank = (0 if moving else 1, tuple(t.joint for t in angle.joints), letters)
+            rank = (0 if moving else 1, angle.joints, letters)
             subscript = self._subscript(angle)
             for letter, function in (("C", sympy.cos), ("S", sympy.sin)):
                 latex = f"{letter}_{{{subscript}}}"

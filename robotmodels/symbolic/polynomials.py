@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -209,35 +208,32 @@ class PolynomialChain(Chain):
     def rotation(self, a: int, b: int) -> Rows:
         """Axes of node b in those of node a."""
         if (a, b) not in self._rotations:
-            before = self.between(a, b)[-2:][0]
-            if a == b:
-                R = [[self.ring.one * (i == k) for k in range(3)] for i in range(3)]
-            elif self.parent.get(b) == before:
-                R = self.steps[b][0]
-            else:
-                R = [list(row) for row in zip(*self.steps[before][0], strict=True)]
-            if before != a:
+            steps = self.steps_between(a, b)
+            if not steps:
+                return [[self.ring.one * (i == k) for k in range(3)] for i in range(3)]
+            node, down = steps[-1]
+            R = self.steps[node][0]
+            if not down:
+                R = [list(row) for row in zip(*R, strict=True)]
+            if len(steps) > 1:
+                before = self.parent[node] if down else node
                 R = self.ring.product(self.rotation(a, before), R)
             self._rotations[a, b] = R
         return self._rotations[a, b]
 
-    def _steps_between(self, a: int, b: int) -> list[tuple[int, list[Poly]]]:
+    def _translations(self, a: int, b: int) -> list[tuple[int, list[Poly]]]:
         """Translations from the origin of a to that of b, each in the axes of a node."""
         out = []
-        path = self.between(a, b)
-        for near, far in pairwise(path):
-            down = self.parent.get(far) == near
-            step = self.steps[far][1] if down else [-v for v in self.steps[near][1]]
+        for node, down in self.steps_between(a, b):
+            step = self.steps[node][1]
             if any(step):
-                out.append((near if down else far, step))
+                out.append((self.parent[node], step if down else [-v for v in step]))
         return out
 
     def lever(self, i: int, a: int, b: int) -> list[Poly]:
         """Vector from the origin of a to that of b, in the axes of i."""
-        return self._sum(
-            self.ring.applied(self.rotation(i, node), step)
-            for node, step in self._steps_between(a, b)
-        )
+        steps = self._translations(a, b)
+        return self._sum(self.ring.applied(self.rotation(i, node), step) for node, step in steps)
 
     def column(self, k: int, i: int, j: int) -> list[Poly]:
         """Column of joint k in the third matrix: projection on i, at the origin of j.
@@ -250,7 +246,7 @@ class PolynomialChain(Chain):
         if self.is_prismatic(k):
             return [*axis, *[ring.zero] * 3]
         terms = []
-        for node, step in self._steps_between(k, j):
+        for node, step in self._translations(k, j):
             b = self.meeting(k, node, i)
             moment = ring.cross(self._axis(b, k), ring.applied(self.rotation(b, node), step))
             terms.append(ring.applied(self.rotation(i, b), moment))
