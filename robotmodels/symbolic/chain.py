@@ -261,11 +261,6 @@ class Chain:
         """Whether products between nodes are short when expanded."""
         return self.angles_between(*nodes) <= _ANGLES_OF_A_FORMULA
 
-    def nested_rotation(self, a: int, b: int) -> Any:
-        """Axes of node b in those of node a, as nested products."""
-        moves = [move for move in self.moves_between(a, b) if move.turns]
-        return multiplied_out(moves, self.notation)[:3, :3]
-
     def nested_position(self, a: int, b: int) -> list[Any]:
         """Origin of node b in node a, as nested products."""
         return list(multiplied_out(self.moves_between(a, b), self.notation)[:3, 3])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -68,8 +68,8 @@ class DirectModelExplanation(Explanation):
     pose: Any
     abbreviations: tuple[tuple[Any, Any], ...]
     constants: tuple[tuple[Any, float], ...]
-    text: str
-    latex: str
+    text: str = ""
+    latex: str = ""
 
     @property
     def s(self) -> Any:
@@ -165,7 +165,6 @@ def explain_dgm(
         pose = multiplied_out(chain.moves_between(WORLD, TOOL), notation)
     base = step("Z", moves[0]) if moves[0] else None
     tool = step("E", moves[TOOL]) if moves[TOOL] else None
-    notation.check_new_names()
     steps = [t for t in (*factors, *products, base, tool) if t]
     draft = DirectModelExplanation(
         robot=model.name,
@@ -179,14 +178,11 @@ def explain_dgm(
         pose=pose,
         abbreviations=notation.used_abbreviations([pose, *(t.matrix for t in steps)]),
         constants=tuple((c.symbol, c.value) for c in notation.constants),
-        text="",
-        latex="",
     )
-    document = _document(draft, chain)
-    return replace(draft, text=document.text, latex=document.latex)
+    return _printed(draft, chain)
 
 
-def _document(e: DirectModelExplanation, chain: Chain) -> Document:
+def _printed(e: DirectModelExplanation, chain: Chain) -> DirectModelExplanation:
     out = Document(
         f"Direct geometric model of {e.robot}: pose of {e.frame} in the world", chain.notation
     )
@@ -209,4 +205,4 @@ def _document(e: DirectModelExplanation, chain: Chain) -> Document:
                 out.add_transform(step.name, step.motion, step.matrix, f"the pose of {of}")
         names = " ".join(t.name for t in (e.base, e.product, e.tool) if t)
         out.add_components("", e.pose, names, f" [1.10], the pose of {e.frame} in the world")
-    return out
+    return out.of(e)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,6 @@ from .notation import Notation
 
 _WIDEST = 96
 """Characters of a row of a matrix; a wider one is printed entry by entry."""
-COMPONENTS = tuple(vector + axis for vector in "snaP" for axis in "xyz")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,9 +60,7 @@ def _number(expr: Any, known: dict[Any, Any]) -> Any:
             if expr.is_Add:
                 value = sum(of)
             elif expr.is_Mul:
-                value = of[0]
-                for factor in of[1:]:
-                    value = value * factor
+                value = prod(of)
             else:  # the only functions of the abbreviations
                 value = {"cos": np.cos, "sin": np.sin}[expr.func.__name__](of[0])
         known[expr] = value
@@ -78,82 +76,78 @@ class Document:
     """An explanation block by block, as plain text and as LaTeX."""
 
     def __init__(self, title: str, notation: Notation) -> None:
+        notation.check_new_names()
         self.notation = notation
         self._text = [title]
         self._latex = [rf"\textbf{{{escaped(title)}}}"]
 
-    @property
-    def text(self) -> str:
-        """All blocks as plain text."""
-        return "\n\n".join(self._text)
-
-    @property
-    def latex(self) -> str:
-        """All blocks as LaTeX."""
-        return "\n\n".join(self._latex)
+    def of(self, draft: Any) -> Any:
+        """The explanation with all blocks as its text and LaTeX."""
+        return replace(draft, text="\n\n".join(self._text), latex="\n\n".join(self._latex))
 
     def add(self, text: str, latex: str = "") -> None:
         """Add a block; without ``latex`` it is a sentence."""
         self._text.append(text)
         self._latex.append(latex or prose(text))
 
-    def add_lines(self, heading: str, lines: Sequence[str], formulas: Sequence[str]) -> None:
-        """A heading with lines in text, and formulas in LaTeX."""
-        latex = "\n\n".join([prose(heading), *map(equation, formulas)])
-        self.add("\n".join([heading, *(f"  {line}" for line in lines)]), latex)
+    def add_lines(self, heading: str, lines: Iterable[str], latex: str) -> None:
+        """A heading with lines in text, and with their formulas in LaTeX."""
+        text = "\n".join([heading, *(f"  {line}" for line in lines)])
+        self.add(text, f"{prose(heading)}\n\n{latex}")
 
     def add_symbols(
         self, shown: Iterable[Any], abbreviations: Sequence[tuple[Any, Any]], every: bool = False
     ) -> None:
         """Constants (those that occur, or every one) and abbreviations."""
         tex = self.notation.tex
-        occur = set().union(
-            *(x.free_symbols for x in shown), *(x.free_symbols for _, x in abbreviations)
-        )
-        used = [c for c in self.notation.constants if every or c.symbol in occur]
-        if used:
-            values = [(c, f"{c.symbol.name} = {c.value:.10g} {c.unit}") for c in used]
-            rows = [
-                (tex(c.symbol.name), rf"{tex(f'{c.value:.10g}')} \, \mathrm{{{c.unit}}} \quad "
-                 rf"({meaning_latex(c.meaning)})")
-                for c in used
-            ]  # fmt: skip
-            lines = [f"  {value} ({c.meaning})" for c, value in values]
-            self.add("\n".join(["Constants", *lines]), f"Constants\n\n{aligned(rows)}")
-        if abbreviations:
-            meanings = [(s.name, self.notation.meanings[s]) for s, _ in abbreviations]
-            lines = [f"  {name} = {meaning}" for name, meaning in meanings]
+        formulas = [*shown, *(meaning for _, meaning in abbreviations)]
+        occur = set().union(*(x.free_symbols for x in formulas))
+        lines, rows = [], []
+        for c in self.notation.constants:
+            if every or c.symbol in occur:
+                name, value = c.symbol.name, f"{c.value:.10g}"
+                lines.append(f"{name} = {value} {c.unit} ({c.meaning})")
+                unit = rf" \, \mathrm{{{c.unit}}} \quad ({meaning_latex(c.meaning)})"
+                rows.append((tex(name), tex(value) + unit))
+        if rows:
+            self.add_lines("Constants", lines, aligned(rows))
+        meanings = [(s.name, self.notation.meanings[s]) for s, _ in abbreviations]
+        if meanings:
             rows = [(tex(name), tex(meaning)) for name, meaning in meanings]
-            self.add("\n".join(["Abbreviations", *lines]), f"Abbreviations\n\n{aligned(rows)}")
+            self.add_lines("Abbreviations", map(" = ".join, meanings), aligned(rows))
 
     def add_transform(self, name: str, motion: str, M: Any, meaning: str = "") -> None:
         """A step ``name = motion = matrix``, entry by entry where it is wide."""
-        cells = self._cells(M)
         factors = motion if "(" in motion else motion.replace(" ", "*")
-        equal = f"{self.notation.tex(name)} = {self.notation.tex(factors)}"
-        latex = f"${self.notation.tex(name)}$, {prose(meaning)}\n\n" if meaning else ""
-        left = f"{name}, {meaning}," if meaning else name
-        if _is_wide(cells):
-            lines = [f"  {line}" for line in _components(cells)]
-            latex += self._components_latex(equal, cells)
-        else:
-            lines = _bracketed(cells)
-            latex += self._matrix_latex(equal, cells)
-        self.add("\n".join([f"{left} = {motion} =", *lines]), latex)
+        symbol, factors = self.notation.tex(name), self.notation.tex(factors)
+        text, latex = self._pose(symbol, factors, M, every=False)
+        if meaning:
+            name, latex = f"{name}, {meaning},", f"${symbol}$, {prose(meaning)}\n\n{latex}"
+        self.add(f"{name} = {motion} =\n{text}", latex)
 
     def add_components(self, name: str, M: Any, product: str, rest: str) -> None:
         """A result: its matrix if that is not wide, then its components."""
-        cells = self._cells(M)
-        of = self.notation.tex(product.replace(" ", "*"))
-        title = f"{self.notation.tex(name)} = {of}" if name else of
-        equal = f"{self.notation.tex(name or 'T')} = {of}"
-        lines, latex = _components(cells), self._components_latex(equal, cells)
-        if not _is_wide(cells):
-            lines = [*_bracketed(cells), "", *lines]
-            latex = f"{self._matrix_latex(equal, cells)}\n\n{latex}"
+        of, symbol = self.notation.tex(product.replace(" ", "*")), self.notation.tex(name or "T")
+        text, latex = self._pose(symbol, of, M, every=True)
+        title = f"{symbol} = {of}" if name else of
         heading = f"Components of {f'{name} = ' if name else ''}{product}{rest}"
-        latex = f"Components of ${title}${prose(rest)}\n\n{latex}"
-        self.add("\n".join([heading, "", *lines]), latex)
+        self.add(f"{heading}\n\n{text}", f"Components of ${title}${prose(rest)}\n\n{latex}")
+
+    def _pose(self, left: str, right: str, M: Any, every: bool) -> tuple[str, str]:
+        """The matrix of a pose, its components where that is wide, or both, as text and LaTeX."""
+        cells = self._cells(M)
+        text, latex = [], []
+        if not _is_wide(cells):
+            text.append("\n".join(_bracketed(cells)))
+            body = f"\\begin{{bmatrix}}\n{self._rows_latex(cells)}\n\\end{{bmatrix}}"
+            latex.append(equations([f"{left} = {right} =\n{body}"]))
+        if every or not text:
+            names = [(v, a, cells[i][j]) for j, v in enumerate("snaP") for i, a in enumerate("xyz")]
+            indent = "" if every else "  "
+            text.append("\n".join(f"{indent}{v}{a} = {cell}" for v, a, cell in names))
+            rows = [(f"{v}_{a}", self.notation.tex(cell)) for v, a, cell in names]
+            latex.append(aligned([(left, right), *rows]))
+        return "\n\n".join(text), "\n\n".join(latex)
 
     def add_matrix(
         self, heading: str, name: str, M: Any, rows: Sequence[str], columns: Sequence[str]
@@ -168,7 +162,7 @@ class Document:
                 lines += [f"  {column}", *(entries or ["    0"])]
         # more than ten columns need another counter of amsmath; an array has no such limit
         body = f"{{{'c' * M.shape[1]}}}\n{self._rows_latex(cells)}\n\\end{{array}}\\right]"
-        matrix = equation(f"{self.notation.tex(name)} =\n\\left[\\begin{{array}}{body}")
+        matrix = equations([f"{self.notation.tex(name)} =\n\\left[\\begin{{array}}{body}"])
         self.add(heading)
         self._text.append("\n".join(lines))
         self._latex.append(matrix)
@@ -178,16 +172,6 @@ class Document:
 
     def _rows_latex(self, cells: list[list[str]]) -> str:
         return " \\\\\n".join(" & ".join(map(self.notation.tex, row)) for row in cells)
-
-    def _matrix_latex(self, equal: str, cells: list[list[str]]) -> str:
-        body = self._rows_latex(cells)
-        return equation(f"{equal} =\n\\begin{{bmatrix}}\n{body}\n\\end{{bmatrix}}")
-
-    def _components_latex(self, equal: str, cells: list[list[str]]) -> str:
-        left, right = equal.split(" = ", 1)
-        parts = [line.split(" = ") for line in _components(cells)]
-        rows = [(f"{a[0]}_{a[1]}", self.notation.tex(b)) for a, b in parts]
-        return aligned([(left, right), *rows])
 
 
 def prose(text: str) -> str:
@@ -207,16 +191,13 @@ def _bracketed(cells: list[list[str]]) -> list[str]:
     return [f"  {left} {line} {right}" for (left, right), line in zip(ends, lines, strict=True)]
 
 
-def _components(cells: list[list[str]]) -> list[str]:
-    return [f"{name} = {cells[k % 3][k // 3]}" for k, name in enumerate(COMPONENTS)]
-
-
 def aligned(rows: Iterable[tuple[str, str]]) -> str:
     """Equations below each other in LaTeX."""
     body = " \\\\\n".join(f"{left} &= {right}" for left, right in rows)
     return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"
 
 
-def equation(body: str) -> str:
-    """A displayed equation in LaTeX."""
-    return f"\\begin{{equation*}}\n{body}\n\\end{{equation*}}"
+def equations(bodies: Iterable[str]) -> str:
+    """Displayed equations in LaTeX."""
+    lines = (f"\\begin{{equation*}}\n{body}\n\\end{{equation*}}" for body in bodies)
+    return "\n\n".join(lines)

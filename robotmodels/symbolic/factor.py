@@ -111,8 +111,13 @@ class _Equation(NamedTuple):
     C: Poly
 
 
-def factor_of(p: Poly, chain: PolynomialChain) -> tuple[SingularityFactor, int]:
-    """The factor without its meaning, and the sign that was taken out of it."""
+def factor_of(p: Any, chain: PolynomialChain) -> tuple[SingularityFactor, int]:
+    """The factor without its meaning, and the sign that was taken out of it.
+
+    ``p`` is a polynomial, or rows of them whose determinant is too long to be written out.
+    """
+    if isinstance(p, tuple):
+        return _long_factor(p, chain), 1
     notation = chain.notation
     expression = formula(p, chain)
     sign = -1 if notation.text(expression).startswith("-") else 1
@@ -150,8 +155,8 @@ def factor_of(p: Poly, chain: PolynomialChain) -> tuple[SingularityFactor, int]:
     return replace(draft, solution=text, solution_latex=latex, never_zero=never), sign
 
 
-def long_factor(M: tuple[tuple[Poly, ...], ...], chain: PolynomialChain) -> SingularityFactor:
-    """A determinant that is too long to be written out: computed from its entries."""
+def _long_factor(M: tuple[tuple[Poly, ...], ...], chain: PolynomialChain) -> SingularityFactor:
+    """A determinant that is computed from its entries."""
     import sympy
 
     entries = sympy.ImmutableDenseMatrix([[formula(p, chain) for p in row] for row in M])
@@ -222,8 +227,7 @@ def _equation(p: Poly, chain: PolynomialChain) -> _Equation | None:
         parts = ring.collected(p, chain.moving[j])
         if any(sum(key) > 1 for key in parts):
             continue
-        symbols = [chain.notation.stroke(j)] if chain.is_prismatic(j) else chain.cosine[j]
-        keys = [next(iter(ring.of(symbol))) for symbol in symbols]
+        keys = [next(iter(ring.of(symbol))) for symbol in chain.symbols_of(j)]
         A, B = ([parts.get(key, ring.zero) for key in keys] + [ring.zero])[:2]
         C = parts.get((0,) * len(ring.symbols), ring.zero)
         a, b, c = (len(chain.joints_of(x)) for x in (A, B, C))

@@ -22,18 +22,20 @@ _PRIMES = (3, 7, 11, 19, 23, 31, 43, 47, 59, 67, 71, 79, 83, 103, 107, 127, 131,
 
 def factored(p: Poly, chain: PolynomialChain) -> tuple[Poly, dict[Poly, int]]:
     """Constant and powers of the factors in which a joint variable occurs."""
-    ring, moving = chain.ring, chain.all_moving
+    ring = chain.ring
     p = chain.cleaned(p)
     if not p:
         return ring.zero, {}
     found: Counter[Poly] = Counter()
-    constant, rest = _monomials(p, chain, found)
-    rest = _squares(rest, chain, found)
-    part = _constant_part(rest, chain)
-    constant, rest = constant * part, rest.exquo(part)
-    if not ring.occurring(rest) & moving:
-        constant, rest = constant * rest, ring.one
-    for factor in _tangent_factors(rest, chain) if rest != ring.one else ():
+    rest = _without_variables(p, chain, found)
+    # the common divisor of the coefficients, as (RL2 + RL3) of (RL2 + RL3)*C4
+    constant = ring.zero
+    for part in ring.collected(rest, chain.all_moving).values():
+        constant = constant.gcd(part)
+    rest = rest.exquo(constant)
+    if not ring.occurring(rest) & chain.all_moving:
+        return constant * rest, dict(found)
+    for factor in _tangent_factors(rest, chain):
         # whole coefficients without a common divisor, the first one positive
         content, factor = factor.primitive()
         if factor.LC < 0:
@@ -44,45 +46,22 @@ def factored(p: Poly, chain: PolynomialChain) -> tuple[Poly, dict[Poly, int]]:
     return constant, dict(found)
 
 
-def _monomials(p: Poly, chain: PolynomialChain, found: Counter[Poly]) -> tuple[Poly, Poly]:
-    """Take out the divisors of every term: constants, and strokes, sines and cosines."""
+def _without_variables(p: Poly, chain: PolynomialChain, found: Counter[Poly]) -> Poly:
+    """Take out strokes, sines and cosines; a sine hidden in 1 - C^2 divides its form in sines."""
     ring = chain.ring
-    lowest = tuple(min(powers) for powers in zip(*p, strict=True))
-    for k in chain.all_moving:
-        if lowest[k]:
-            found[ring.gens[k]] += lowest[k]
-    constant = tuple(0 if k in chain.all_moving else e for k, e in enumerate(lowest))
-    return ring.ring({constant: 1}), p.exquo(ring.ring({lowest: 1}))
-
-
-def _squares(p: Poly, chain: PolynomialChain, found: Counter[Poly]) -> Poly:
-    """Take out sines hidden in 1 - C^2: written with squares of sines they divide every term."""
-    ring = chain.ring
+    cosine_of = {s: c for c, s in ring.pairs}
     again = True
     while again:
         again = False
-        for j in chain.cosine:
-            c, s = (ring.index[symbol] for symbol in chain.cosine[j])
-            C, S = ring.gens[c], ring.gens[s]
-            by_sines = ring.replaced(p, c, 1 - S**2)
-            for generator, k, form in ((S, s, by_sines), (C, c, p)):
-                if min(monomial[k] for monomial in form) > 0:
-                    found[generator] += 1
-                    p = ring.reduced(form.exquo(generator))
-                    again = True
-                    break
+        for k in chain.all_moving:
+            own = ring.gens[k]
+            form = ring.replaced(p, cosine_of[k], 1 - own**2) if k in cosine_of else p
+            lowest = min(monomial[k] for monomial in form)
+            if lowest:
+                found[own] += lowest
+                p = ring.reduced(form.exquo(own**lowest))
+                again = True
     return p
-
-
-def _constant_part(p: Poly, chain: PolynomialChain) -> Poly:
-    """The common divisor of the coefficients, as (RL2 + RL3) of (RL2 + RL3)*C4."""
-    parts = chain.ring.collected(p, chain.all_moving).values()
-    common = chain.ring.zero
-    for part in parts:
-        common = common.gcd(part)
-        if len(part) == 1 or len(common) == 1:
-            return chain.ring.one  # monomials are taken out already
-    return common
 
 
 def _tangent_factors(p: Poly, chain: PolynomialChain) -> list[Poly]:

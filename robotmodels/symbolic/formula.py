@@ -25,14 +25,14 @@ def formula(p: Poly, chain: PolynomialChain) -> Any:
 
     if not p:
         return sympy.S.Zero
-    forms = [_terms(p, chain, [(j,) for j in sorted(chain.cosine)], summed=False)]
+    forms = [_terms(p, chain, [(j,) for j in sorted(chain.cosine)])]
     candidates = []
     if len(p) <= _LONGEST:
         units = chain.parallel_groups
         grouped = [chain.moving[j] for unit in units if len(unit) > 1 for j in unit]
         # the power of a sine or cosine has no simple form in sums of angles
         if grouped and all(sum(m[k] for k in own) <= 1 for own in grouped for m in p):
-            forms.append(_terms(p, chain, units, summed=True))
+            forms.append(_terms(p, chain, units))
         for terms in forms:
             order = range(len(next(iter(terms))))
             candidates += [_nested(terms, o, chain) for o in (order, order[::-1])]
@@ -45,10 +45,8 @@ def formulas(entries: Sequence[Poly], chain: PolynomialChain) -> list[Any]:
     return [formula(chain.cleaned(p), chain) for p in entries]
 
 
-def _terms(
-    p: Poly, chain: PolynomialChain, units: Sequence[tuple[int, ...]], summed: bool
-) -> _Terms:
-    """Terms of p by the trigonometric part of each unit (joints whose axes are parallel)."""
+def _terms(p: Poly, chain: PolynomialChain, units: Sequence[tuple[int, ...]]) -> _Terms:
+    """Terms of p by the trigonometric part of each unit: a joint, or joints of parallel axes."""
     ring = chain.ring
     places = {j: [ring.index[s] for s in pair] for j, pair in chain.cosine.items()}
     own = frozenset(k for place in places.values() for k in place)
@@ -58,7 +56,7 @@ def _terms(
         for unit in units:
             powers = [(j, *(monomial[k] for k in places[j])) for j in unit]
             powers = [x for x in powers if x[1] or x[2]]
-            sums = summed and len(unit) > 1 and powers
+            sums = len(unit) > 1 and powers
             options.append(_product_to_sum(powers) if sums else {tuple(powers): Fraction(1)})
         for choice in product(*(option.items() for option in options)):
             key = tuple(part for part, _ in choice)

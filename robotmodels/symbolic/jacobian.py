@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,8 +14,8 @@ from ..errors import InvalidValueError
 from ..kinematics.factors import JacobianFactors, middle_frames
 from ..latex_text import Explanation
 from ..model import FrameOfInterest, RobotModel, check_model
-from .chain import TOOL, WORLD
-from .explanation import Document, FormulaNumbers, aligned, equation, frame_label
+from .chain import TOOL, WORLD, multiplied_out
+from .explanation import Document, FormulaNumbers, aligned, equations, frame_label
 from .factor import numbers_of
 from .formula import formulas
 from .minors import ROWS, filled_entries
@@ -49,8 +49,8 @@ class JacobianExplanation(Explanation):
     lever: Any
     reduced: Any
     numbers: FormulaNumbers
-    text: str
-    latex: str
+    text: str = ""
+    latex: str = ""
 
     @property
     def first(self) -> Any:
@@ -71,8 +71,10 @@ class JacobianExplanation(Explanation):
     def evaluate(self, q: ArrayLike) -> JacobianFactors:
         """The three matrices in numbers at q (..., n): equal to `jacobian_factors`."""
         q = as_vector(q, len(self.numbers.variables), "q")
-        factors = (self.numbers.matrix(M, q) for M in (self.first, self.second, self.reduced))
-        return JacobianFactors(*factors, self.projection, self.intermediate)
+        first, second, third = (
+            self.numbers.matrix(M, q) for M in (self.first, self.second, self.reduced)
+        )
+        return JacobianFactors(first, second, third, self.projection, self.intermediate)
 
     def __repr__(self) -> str:
         return f"<JacobianExplanation of {self.robot}: {self.projection}, {self.intermediate}>"
@@ -130,7 +132,6 @@ def explain_jacobian(
     for k in chain.path_joints:
         reduced[:, chain.joints[k]] = sympy.Matrix(_column(chain, k, i, j))
     reduced = sympy.ImmutableDenseMatrix(reduced)
-    chain.notation.check_new_names()
     label = frame_label(frame)
     names = [label if node == TOOL else f"R_{node}" for node in (i, j)]
     draft = JacobianExplanation(
@@ -142,11 +143,8 @@ def explain_jacobian(
         lever=lever,
         reduced=reduced,
         numbers=numbers_of(chain, [rotation, lever, reduced]),
-        text="",
-        latex="",
     )
-    document = _document(draft, chain)
-    return replace(draft, text=document.text, latex=document.latex)
+    return _printed(draft, chain)
 
 
 # An arm with many oblique axes has entries of thousands of terms when they are expanded. These are
@@ -161,7 +159,8 @@ def _rotation(chain: PolynomialChain, i: int) -> Any:
     if chain.is_short(WORLD, i):
         rows = [formulas(row, chain) for row in chain.rotation(WORLD, i)]
         return sympy.ImmutableDenseMatrix(rows)
-    return chain.nested_rotation(WORLD, i)
+    moves = [move for move in chain.moves_between(WORLD, i) if move.turns]
+    return multiplied_out(moves, chain.notation)[:3, :3]
 
 
 def _lever(chain: PolynomialChain, i: int, j: int) -> list[Any]:
@@ -240,7 +239,7 @@ def reduced_name(projection: str, intermediate: str, last: int) -> str:
     return f"{_letter(projection)}J{last},{_letter(intermediate)}"
 
 
-def _document(e: JacobianExplanation, chain: PolynomialChain) -> Document:
+def _printed(e: JacobianExplanation, chain: PolynomialChain) -> JacobianExplanation:
     out = Document(f"Jacobian of {e.robot}: motion of {e.frame} in the world", chain.notation)
     i, j = _letter(e.projection), _letter(e.intermediate)
     name = reduced_name(e.projection, e.intermediate, chain.path[-1] if chain.path else 0)
@@ -253,7 +252,7 @@ def _document(e: JacobianExplanation, chain: PolynomialChain) -> Document:
     out.add(
         f"J = diag({i}R, {i}R) [1, -[L]x; 0, 1] {name} with projection frame {e.projection} and "
         f"intermediate frame {e.intermediate}",
-        equation(rf"\mathbf{{J}} = {product}"),
+        equations([rf"\mathbf{{J}} = {product}"]),
     )
     out.add_symbols([e.rotation, e.lever, e.reduced], e.numbers.abbreviations)
     heading = f"{i}R, the axes of {e.projection} in the world"
@@ -266,4 +265,4 @@ def _document(e: JacobianExplanation, chain: PolynomialChain) -> Document:
     out.add("\n".join(lines), aligned(tex))
     columns = [f"joint {int(row) + 1}" for row in chain.table.joint_rows]
     out.add_matrix(f"{name}, rows vx, vy, vz, wx, wy, wz", name, e.reduced, ROWS, columns)
-    return out
+    return out.of(e)

@@ -7,6 +7,7 @@ block triangular form (A. L. Dulmage and N. S. Mendelsohn, "Coverings of biparti
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache, partial
 from itertools import combinations
 from math import comb
 from typing import Any, NamedTuple
@@ -21,7 +22,7 @@ from ..kinematics.singular.task import position_decides
 from ..model import RobotModel
 from .chain import TOOL, Chain
 from .factoring import factored
-from .polynomials import Poly, PolynomialChain
+from .polynomials import Poly, PolynomialChain, TrigRing
 
 ROWS = ("vx", "vy", "vz", "wx", "wy", "wz")
 _ZERO = 1e-11
@@ -46,16 +47,7 @@ class Minor(NamedTuple):
     columns: tuple[int, ...]
     projection: int
     intermediate: int
-
-
-class Task(NamedTuple):
-    """Minors that decide about the rank of a task."""
-
-    words: str
-    minors: tuple[Minor, ...]
-    square: bool = False
-    position_only: bool = False
-    too_many: bool = False
+    blocks: tuple[Block, ...]
 
 
 def filled_entries(
@@ -82,71 +74,74 @@ class Patterns:
         patterns = filled_entries(model, frame, pairs)
         self.count = len(places)
         self.filled = {ij: pattern[:, places] for ij, pattern in patterns.items()}
-        self._middle = (len(chain.path) / 2, (len(chain.path) + 1) / 2)
-        self._order = {j: k for k, j in enumerate(frames)} | {TOOL: len(frames)}
+        # places of the frames along the path, from its middle
+        self._place = {j: k - len(chain.path) / 2 for k, j in enumerate([*frames, TOOL])}
         J = jacobian(model, random_postures(model, 4, seed=3), frame)[..., places]
         self.rank = int(np.linalg.matrix_rank(J, tol=1e-9).max())
         self.position_only = position_decides(model, frame)
 
-    def _away(self, i: int, j: int) -> float:
-        a, b = self._middle
-        return abs(self._order[i] - a) + abs(self._order[j] - b)
+    def best(self, columns: tuple[int, ...]) -> list[Minor]:
+        """The square part in the frames of its simplest determinant; empty if that is zero.
 
-    def best(self, rows: Sequence[int] | None, columns: Sequence[int]) -> Minor:
-        """The frames in which a square part has the simplest determinant.
-
-        rows None: those that are not zero, where there are as many as columns.
+        Its rows are those that are not zero, in frames where there are as many as columns.
         """
         found = []
         for (i, j), filled in self.filled.items():
-            own = nonzero_rows(filled) if rows is None else tuple(rows)
-            if len(own) == len(columns):
-                part = filled[np.ix_(own, columns)]
+            rows = nonzero_rows(filled) if self.rank < 6 else tuple(range(6))
+            blocks = triangular_blocks(filled, rows, columns) if len(rows) == self.rank else ()
+            if blocks:
                 # the tool's place is a constant more
-                key = (*_cost(triangular_blocks(part), part), j == TOOL, self._away(i, j))
-                found.append((key, Minor(own, tuple(columns), i, j)))
-        return min(found, key=lambda option: option[0])[1]
+                away = abs(self._place[i]) + abs(self._place[j] - 0.5)
+                key = (*_cost(blocks, filled), j == TOOL, away)
+                found.append((key, Minor(rows, columns, i, j, blocks)))
+        return [minor for _, minor in sorted(found, key=lambda option: option[0])[:1]]
 
-    def row_minors(self, position: bool = False) -> tuple[Minor, ...]:
+    def row_minors(self) -> list[Minor]:
         """Square parts of a matrix with more rows than columns, in the frames that suit all."""
         found = []
+        columns = tuple(range(self.count))
         for (i, j), filled in self.filled.items():
-            if position and j != TOOL:
+            if self.position_only and j != TOOL:
                 continue
-            pattern = filled[:3] if position else filled
-            minors, work = [], 0
-            for rows in combinations(nonzero_rows(pattern), self.count):
-                part = pattern[list(rows)]
-                blocks = triangular_blocks(part)
-                if blocks is not None:
-                    work += _cost(blocks, part)[0]
-                    minors.append(Minor(rows, tuple(range(self.count)), i, j))
-            away = abs(self._order[i] - self._middle[0])
-            if minors:
-                found.append(((work, int(pattern.sum()), j == TOOL, away), tuple(minors)))
+            pattern = filled[:3] if self.position_only else filled
+            parts = [
+                Minor(rows, columns, i, j, blocks)
+                for rows in combinations(nonzero_rows(pattern), self.count)
+                if (blocks := triangular_blocks(pattern, rows, columns))
+            ]
+            work = sum(_cost(minor.blocks, pattern)[0] for minor in parts)
+            if parts:
+                key = (work, int(pattern.sum()), j == TOOL, abs(self._place[i]))
+                found.append((key, parts))
         return min(found, key=lambda option: option[0])[1]
 
 
-def triangular_blocks(filled: Pattern) -> tuple[Block, ...] | None:
-    """Diagonal blocks of the finest block triangular form, None if the determinant is zero."""
+def triangular_blocks(
+    filled: Pattern, rows: Sequence[int], columns: Sequence[int]
+) -> tuple[Block, ...]:
+    """Diagonal blocks of the finest block triangular form; empty if the determinant is zero."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
 
-    column_of = maximum_bipartite_matching(csr_array(filled.astype(np.int8)), perm_type="column")
+    part = filled[np.ix_(rows, columns)].astype(np.int8)
+    column_of = maximum_bipartite_matching(csr_array(part), perm_type="column")
     if (column_of < 0).any():
-        return None
+        return ()
     # row r stands for the pair (r, column_of[r]): pairs that reach each other make a block
-    reach = csr_array(filled[:, column_of].astype(np.int8))
+    reach = csr_array(part[:, column_of])
     count, label = connected_components(reach, directed=True, connection="strong")
-    rows = [np.flatnonzero(label == k) for k in range(count)]
-    blocks = [Block(tuple(r.tolist()), tuple(sorted(column_of[r].tolist()))) for r in rows]
+    places = [np.flatnonzero(label == k).tolist() for k in range(count)]
+    blocks = [
+        Block(
+            tuple(rows[r] for r in own), tuple(columns[c] for c in sorted(column_of[own].tolist()))
+        )
+        for own in places
+    ]
     return tuple(sorted(blocks, key=lambda block: block.columns))
 
 
-def _cost(blocks: tuple[Block, ...] | None, filled: Pattern) -> tuple[int, int]:
+def _cost(blocks: tuple[Block, ...], filled: Pattern) -> tuple[int, int]:
     """Work of a determinant: smaller blocks first, then fewer entries."""
-    if blocks is None:
-        return 10**6, 0
     entries = sum(int(filled[np.ix_(block.rows, block.columns)].sum()) for block in blocks)
     return sum(len(block.rows) ** 3 for block in blocks), entries
 
@@ -156,27 +151,25 @@ def nonzero_rows(filled: Pattern) -> tuple[int, ...]:
     return tuple(int(r) for r in np.flatnonzero(filled.any(axis=1)))
 
 
-def task_of(patterns: Patterns) -> Task:
-    """Choose the minors that decide about the rank of a motion; none if it is never full."""
-    count, rank = patterns.count, patterns.rank
+def deciding_minors(patterns: Patterns) -> tuple[str, list[Minor] | None]:
+    """Rows that count, in words, and the minors that decide about the rank.
+
+    None of them if it is never full, and None in their place if they are too many.
+    """
+    count, rank, words = patterns.count, patterns.rank, "all six rows"
     if patterns.position_only:
-        task = patterns.row_minors(position=True)
-        rows = f", rows {_row_words(task[0].rows)}" if len(task) == 1 else ""
-        return Task(f"the position of the frame{rows}", task, len(task) == 1, True)
+        minors = patterns.row_minors()
+        rows = f", rows {_row_words(minors[0].rows)}" if len(minors) == 1 else ""
+        return f"the position of the frame{rows}", minors
     fewest = min(len(nonzero_rows(filled)) for filled in patterns.filled.values())
     if rank == 6 or rank == fewest:
         if comb(count, rank) > _MOST_MINORS:
-            return Task("all six rows", (), too_many=True)
-        rows = range(6) if rank == 6 else None
-        minors = tuple(patterns.best(rows, columns) for columns in combinations(range(count), rank))
-        words = "all six rows"
+            return words, None
+        minors = [m for columns in combinations(range(count), rank) for m in patterns.best(columns)]
         if rank < 6:
             words = f"the rows that are not zero, {_row_words(minors[0].rows)}"
-        return Task(words, minors, count == rank)
-    if rank < count:
-        return Task("all six rows", ())
-    task = patterns.row_minors()
-    return Task("all six rows", task, len(task) == 1)
+        return words, minors
+    return words, patterns.row_minors() if rank == count else []
 
 
 def _row_words(rows: Sequence[int]) -> str:
@@ -194,11 +187,11 @@ def smallest_sets(
     A factor is a polynomial, or the entries of a matrix whose determinant is not written out.
     """
     cases: list[frozenset[Any]] = [frozenset()]
-    reduced = _Reduced(chain)
+    factors_at = cache(partial(_factors_at, chain=chain))
     for minor in sorted(minors, key=lambda factors: sum(map(_length, factors))):
         grown: set[frozenset[Any]] = set()
         for case in cases:
-            parts = [reduced(p, case) for p in minor]
+            parts = [_remaining(p, case, chain.ring, factors_at) for p in minor]
             if None in parts:
                 grown.add(case)
             else:
@@ -214,46 +207,37 @@ def _length(p: Any) -> int:
     return 10**6 if isinstance(p, tuple) else len(p)
 
 
-class _Reduced:
-    """Factors of a polynomial where some sines, cosines and strokes are zero."""
+def _remaining(
+    p: Any, case: frozenset[Any], ring: TrigRing, factors_at: Callable[..., Any]
+) -> tuple[Any, ...] | None:
+    """Factors of which one has to vanish for p to vanish in a case; None if p vanishes there."""
+    if p in case:
+        return None
+    if isinstance(p, tuple):
+        return (p,)
+    present = ring.occurring(p)
+    present |= {ring.partner[k] for k in present if k in ring.partner}
+    zeros = present & {_generator(factor) for factor in case}
+    parts = factors_at(p, zeros) if zeros else (p,)
+    return None if parts is None or any(part in case for part in parts) else parts
 
-    def __init__(self, chain: PolynomialChain) -> None:
-        self.chain = chain
-        self._known: dict[Any, tuple[Poly, ...] | None] = {}
-        self._partner = {a: b for pair in chain.ring.pairs for a, b in (pair, pair[::-1])}
 
-    def __call__(self, p: Any, case: frozenset[Any]) -> tuple[Any, ...] | None:
-        """Factors of which one has to vanish for p to vanish; None if p vanishes already."""
-        if p in case:
-            return None
-        if isinstance(p, tuple):
-            return (p,)
-        zeros = frozenset(k for factor in case if (k := self._generator(factor)) is not None)
-        present = self.chain.ring.occurring(p)
-        zeros &= present | {self._partner[k] for k in present if k in self._partner}
-        if not zeros:
-            return (p,)
-        if (p, zeros) not in self._known:
-            self._known[p, zeros] = self._factors(p, zeros)
-        parts = self._known[p, zeros]
-        return None if parts is None or any(part in case for part in parts) else parts
+def _generator(p: Any) -> int | None:
+    """Number of the sine, cosine or stroke that p is."""
+    if isinstance(p, tuple) or len(p) != 1:
+        return None
+    (monomial,) = p
+    return monomial.index(1) if sum(monomial) == 1 else None
 
-    def _generator(self, p: Any) -> int | None:
-        """Number of the sine, cosine or stroke that p is."""
-        if isinstance(p, tuple) or len(p) != 1:
-            return None
-        (monomial,) = p
-        return monomial.index(1) if sum(monomial) == 1 else None
 
-    def _factors(self, p: Poly, zeros: frozenset[int]) -> tuple[Poly, ...] | None:
-        ring = self.chain.ring
-        # where a sine is zero the cosine is 1 or -1, so that its square is 1
-        units = {self._partner[k] for k in zeros if k in self._partner}
-        left = {m: c for m, c in p.items() if not any(m[k] for k in zeros)}
-        out = ring.ring(left) if left else ring.zero
-        for k in units:
-            out = ring.replaced(out, k, ring.one)
-        if not out:
-            return None
-        constant, found = factored(out, self.chain)
-        return tuple(q for q in found if self._generator(q) not in units) if constant else None
+def _factors_at(p: Poly, zeros: frozenset[int], chain: PolynomialChain) -> tuple[Poly, ...] | None:
+    """Factors of a polynomial where some sines, cosines and strokes are zero; None if it is."""
+    ring = chain.ring
+    # where a sine is zero the cosine is 1 or -1, so that its square is 1
+    units = {ring.partner[k] for k in zeros if k in ring.partner}
+    left = {m: c for m, c in p.items() if not any(m[k] for k in zeros)}
+    out = ring.ring(left) if left else ring.zero
+    for k in units:
+        out = ring.replaced(out, k, ring.one)
+    constant, found = factored(out, chain)
+    return tuple(q for q in found if _generator(q) not in units) if constant else None

@@ -61,10 +61,13 @@ class Notation:
         self._facts: dict[Any, _Facts] = {}
         self._short: dict[Any, Any] = {}
         self._printed: dict[Any, str] = {}
-        self.variables = tuple(
-            self._variable(int(row) + 1, bool(table.sigma[row] == PRISMATIC))
-            for row in table.joint_rows
-        )
+        variables = []
+        for row in table.joint_rows:
+            j = int(row) + 1
+            name, latex = ("r", "r") if table.sigma[row] == PRISMATIC else ("theta", r"\theta")
+            rank, facts = (2, j), _Facts(1, moves=True)
+            variables.append(self._symbol(f"{name}{j}", f"{latex}_{{{j}}}", rank, facts))
+        self.variables = tuple(variables)
 
     def _symbol(self, name: str, latex: str, rank: tuple[Any, ...], facts: _Facts) -> Any:
         import sympy
@@ -76,10 +79,6 @@ class Notation:
         self._rank[symbol] = rank
         self._facts[symbol] = facts
         return symbol
-
-    def _variable(self, j: int, prismatic: bool) -> Any:
-        name, latex = ("r", "r") if prismatic else ("theta", r"\theta")
-        return self._symbol(f"{name}{j}", f"{latex}_{{{j}}}", (2, j), _Facts(1, True))
 
     def joint_angle(self, j: int) -> Angle:
         """The angle theta_j of a revolute joint without its offset."""

@@ -36,6 +36,7 @@ class TrigRing:
         self.ring: Any = ring(self.symbols, sympy.QQ)[0]
         self.index = {symbol: k for k, symbol in enumerate(self.symbols)}
         self.pairs = [(self.index[c], self.index[s]) for c, s in pairs]
+        self.partner = {a: b for pair in self.pairs for a, b in (pair, pair[::-1])}
         self.zero, self.one, self.gens = self.ring.zero, self.ring.one, self.ring.gens
         # index of the generator whose square is known, and its square
         self._squares = [(0, 2 * self.one), (1, 3 * self.one)]
@@ -81,10 +82,6 @@ class TrigRing:
     def dot(self, u: Sequence[Poly], v: Sequence[Poly]) -> Poly:
         """Scalar product."""
         return self.reduced(sum((a * b for a, b in zip(u, v, strict=True)), self.zero))
-
-    def product(self, A: Rows, B: Rows) -> Rows:
-        """Matrix product."""
-        return [[self.dot(row, column) for column in zip(*B, strict=True)] for row in A]
 
     def applied(self, A: Rows, v: Sequence[Poly]) -> list[Poly]:
         """Product of a matrix and a vector."""
@@ -141,17 +138,15 @@ class PolynomialChain(Chain):
         self.steps = {j: self._step(moves) for j, moves in self.moves.items()}
         self._rotations: dict[tuple[int, int], Rows] = {}
         self.known = self._values()
-        index = self.ring.index
         # generators of each joint
         self.moving = {
-            j: frozenset(
-                {index[self.notation.stroke(j)]}
-                if self.is_prismatic(j)
-                else (index[s] for s in self.cosine[j])
-            )
-            for j in self.joints
+            j: frozenset(self.ring.index[s] for s in self.symbols_of(j)) for j in self.joints
         }
         self.all_moving = frozenset().union(*self.moving.values())
+
+    def symbols_of(self, j: int) -> tuple[Any, ...]:
+        """Stroke of a prismatic joint; cosine and sine of a revolute one."""
+        return (self.notation.stroke(j),) if self.is_prismatic(j) else self.cosine[j]
 
     def _ring(self) -> TrigRing:
         plain: set[Any] = set()
@@ -213,12 +208,9 @@ class PolynomialChain(Chain):
                 return [[self.ring.one * (i == k) for k in range(3)] for i in range(3)]
             node, down = steps[-1]
             R = self.steps[node][0]
-            if not down:
-                R = [list(row) for row in zip(*R, strict=True)]
-            if len(steps) > 1:
-                before = self.parent[node] if down else node
-                R = self.ring.product(self.rotation(a, before), R)
-            self._rotations[a, b] = R
+            columns = list(zip(*R, strict=True)) if down else R
+            before = self.rotation(a, self.parent[node] if down else node)
+            self._rotations[a, b] = [[self.ring.dot(row, c) for c in columns] for row in before]
         return self._rotations[a, b]
 
     def _translations(self, a: int, b: int) -> list[tuple[int, list[Poly]]]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache, partial
+from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,12 +16,12 @@ from ..kinematics.lengths import ModelCache
 from ..kinematics.singular.events import ArmGeometry
 from ..model import RobotModel, check_model
 from .chain import TOOL
-from .explanation import Document, equation, frame_label, prose
-from .factor import SingularityFactor, factor_of, long_factor, numbers_of, unit_text, with_meaning
+from .explanation import Document, equations, frame_label, prose
+from .factor import SingularityFactor, factor_of, numbers_of, unit_text, with_meaning
 from .factoring import factored
 from .formula import formula, formulas
 from .jacobian import reduced_name
-from .minors import ROWS, Block, Minor, Patterns, Task, smallest_sets, task_of, triangular_blocks
+from .minors import ROWS, Block, Minor, Patterns, deciding_minors, smallest_sets
 from .notation import checked_names
 from .polynomials import Poly, PolynomialChain
 from .singularity_explanation import FormulaStatus, SingularityCondition, SingularityExplanation
@@ -80,21 +82,22 @@ def _explanation(
     chain = PolynomialChain(model, model.twin.frame(frame), symbols)
     numbers, none = numbers_of(chain, []), FormulaStatus.NO_JOINTS
     draft = SingularityExplanation(model.name, frame_label(frame), none, "no rows", numbers)
-    patterns = Patterns(model, frame, chain) if chain.path_joints else None
-    task = task_of(patterns) if patterns else None
-    if not patterns or not task or not task.minors:
-        chain.notation.check_new_names()
-        if task:
-            status = FormulaStatus.NEVER_FULL_RANK
-            if task.too_many:
-                status = FormulaStatus.TOO_MANY_JOINTS
-            zero = len(chain.path_joints) == 6 and not task.too_many
-            constant = 0.0 if zero else float("nan")
-            draft = replace(draft, status=status, task=task.words, constant=constant)
+    if not chain.path_joints:
         return _printed(draft, chain)
-    arm = ArmGeometry(model, frame, chain.path_joints, task.position_only)
-    products = [_product(minor, patterns, chain) for minor in task.minors]
-    return _explained(draft, task, [p for p in products if p.constant], chain, arm)
+    patterns = Patterns(model, frame, chain)
+    words, minors = deciding_minors(patterns)
+    draft = replace(draft, task=words)
+    if minors is None:
+        return _printed(replace(draft, status=FormulaStatus.TOO_MANY_JOINTS), chain)
+    if not minors:
+        constant = 0.0 if patterns.count == 6 else float("nan")
+        never = FormulaStatus.NEVER_FULL_RANK
+        return _printed(replace(draft, status=never, constant=constant), chain)
+    arm = ArmGeometry(model, frame, chain.path_joints, patterns.position_only)
+    square = len(minors) == 1 and len(minors[0].columns) == patterns.count
+    products = [_product(minor, patterns, chain) for minor in minors]
+    products = [product for product in products if product.constant]
+    return _explained(draft, products, _Factors(chain, arm, square))
 
 
 class Product(NamedTuple):
@@ -111,16 +114,14 @@ def _product(minor: Minor, patterns: Patterns, chain: PolynomialChain) -> Produc
     i, j = minor.projection, minor.intermediate
     columns = {c: chain.column(chain.path_joints[c], i, j) for c in minor.columns}
     filled = patterns.filled[i, j]
-    blocks = triangular_blocks(filled[np.ix_(minor.rows, minor.columns)])
-    if blocks is None:
-        return Product(minor, ring.zero, {})
-    constant = ring.one * _order_sign(blocks)
+    constant = ring.one * _order_sign(minor.blocks)
     powers: Counter[Any] = Counter()
-    for block in blocks:
-        own = [minor.columns[c] for c in block.columns]
+    for block in minor.blocks:
         M = tuple(
-            tuple(chain.cleaned(columns[c][r]) if filled[r, c] else ring.zero for c in own)
-            for r in (minor.rows[k] for k in block.rows)
+            tuple(
+                chain.cleaned(columns[c][r]) if filled[r, c] else ring.zero for c in block.columns
+            )
+            for r in block.rows
         )
         D = ring.determinant(M, _MOST_TERMS)
         if D is None:
@@ -145,26 +146,15 @@ class _Factors:
     """Factors of the minors in formulas and words, each made once."""
 
     def __init__(self, chain: PolynomialChain, arm: ArmGeometry, square: bool) -> None:
-        self.chain, self.arm, self.square = chain, arm, square
-        self._drafts: dict[Any, tuple[SingularityFactor, int]] = {}
-        self._complete: dict[Any, SingularityFactor] = {}
-
-    def draft(self, p: Any) -> tuple[SingularityFactor, int]:
-        """The factor without its meaning, and the sign that was taken out of it."""
-        if p not in self._drafts:
-            long = isinstance(p, tuple)
-            self._drafts[p] = (long_factor(p, self.chain), 1) if long else factor_of(p, self.chain)
-        return self._drafts[p]
-
-    def __call__(self, p: Any) -> SingularityFactor:
-        if p not in self._complete:
-            draft, _ = self.draft(p)
-            self._complete[p] = with_meaning(draft, self.chain, self.arm, self.square)
-        return self._complete[p]
+        self.chain, self.square = chain, square
+        # without its meaning, and the sign that was taken out of it
+        self.draft = cache(partial(factor_of, chain=chain))
+        self.made = cache(lambda p: with_meaning(self.draft(p)[0], chain, arm, square))
 
     def order(self, p: Any) -> tuple[Any, ...]:
         """Place among the factors."""
-        return _ORDER[self(p).kind], self(p).joints, self(p).text
+        factor = self.made(p)
+        return _ORDER[factor.kind], factor.joints, factor.text
 
     def impossible(self, factors: frozenset[Any]) -> bool:
         """Whether two factors of one joint alone vanish at different values of it."""
@@ -185,65 +175,53 @@ class _Factors:
 
 def _explained(
     draft: SingularityExplanation,
-    task: Task,
     products: Sequence[Product],
-    chain: PolynomialChain,
-    arm: ArmGeometry,
+    book: _Factors,
 ) -> SingularityExplanation:
-    book = _Factors(chain, arm, task.square)
+    chain, square = book.chain, book.square
     constant, powers = None, {}
     expressions: list[Any] = []
-    if task.square:
+    if square:
         ((minor, factor, powers),) = products
         keys = list(powers)
-        sets = [frozenset({p}) for p in keys if not book(p).never_zero]
-        signed = factor * int(np.prod([book.draft(p)[1] ** k for p, k in powers.items()]))
+        sets = [frozenset({p}) for p in keys if not book.made(p).never_zero]
+        signed = factor * prod(book.draft(p)[1] ** k for p, k in powers.items())
         constant = formula(signed, chain)
         expressions.append(_matrix(minor, chain))
-        names = [draft.frame if node == TOOL else f"R_{node}" for node in minor[2:]]
-        draft = replace(
-            draft,
-            constant=chain.ring.value(signed, chain.known),
-            projection=names[0],
-            intermediate=names[1],
-            matrix=expressions[0],
-            rows=minor.rows,
-        )
+        i, j = (draft.frame if node == TOOL else f"R_{node}" for node in minor[2:4])
+        draft = replace(draft, projection=i, intermediate=j, matrix=expressions[0], rows=minor.rows)
+        draft = replace(draft, constant=chain.ring.value(signed, chain.known))
     else:
-        sets = smallest_sets(
-            [list(product.factors) for product in products], chain, book.impossible
-        )
+        sets = smallest_sets([list(p.factors) for p in products], chain, book.impossible)
         keys = list(dict.fromkeys(p for s in sets or () for p in s))
     ordered = sorted(keys, key=book.order)
-    made = {p: replace(book(p), power=powers.get(p, 1)) for p in ordered}
+    made = {p: replace(book.made(p), power=powers.get(p, 1)) for p in ordered}
     factors = tuple(made.values())
-    chain.notation.check_new_names()
     # a row of velocities of translation each, less the strokes
-    first = task.minors[0]
+    first = products[0].minor
     degree = sum(row < 3 for row in first.rows)
     degree -= sum(chain.is_prismatic(chain.path_joints[c]) for c in first.columns)
     expressions += [f.expression for f in factors if f.expression is not None]
     draft = replace(
         draft,
-        status=_status(task, factors, sets),
-        task=task.words,
+        status=_status(square, factors, sets),
         factors=factors,
         conditions=_conditions(sets or [], book, made),
         unit=unit_text(degree),
         numbers=numbers_of(chain, expressions),
     )
-    minors = [] if task.square else [_minor_text(p, book, chain) for p in products[:_MOST_MINORS]]
+    minors = [] if square else [_minor_text(p, book, chain) for p in products[:_MOST_MINORS]]
     return _printed(draft, chain, constant, minors)
 
 
 def _status(
-    task: Task, factors: Sequence[SingularityFactor], sets: Sequence[Any] | None
+    square: bool, factors: Sequence[SingularityFactor], sets: Sequence[Any] | None
 ) -> FormulaStatus:
     if sets is None:
         return FormulaStatus.TOO_MANY_FAMILIES
     if any(factor.expression is None for factor in factors):
         return FormulaStatus.TOO_LONG
-    if not task.square:
+    if not square:
         return FormulaStatus.MINORS
     if len(factors) == 1 and len(factors[0].joints) >= 3:
         return FormulaStatus.NOT_FACTORED
@@ -323,21 +301,22 @@ def _printed(
         out.add_matrix(heading, name, e.matrix, rows, columns)
         words = [notation.text(constant)] if constant != 1 or not e.factors else []
         whole = _joined(words + [_power(f.text, f.power) for f in e.factors])
-        out.add(f"Its determinant is {whole}", equation(rf"\det = {notation.tex(whole)}"))
+        out.add(f"Its determinant is {whole}", equations([rf"\det = {notation.tex(whole)}"]))
     if minors:
         heading = f"Minors of the third matrix ({e.task}), up to constants"
-        out.add_lines(heading, minors, list(map(notation.tex, minors)))
+        out.add_lines(heading, minors, equations(map(notation.tex, minors)))
     if e.factors:
         out.add("Factors")
     for f in e.factors:
         lines = [f"{f.kind.value}: {f.text} = 0", *(f"  {x}" for x in (f.meaning, f.solution) if x)]
-        latex = [equation(x) for x in (f"{f.latex} = 0", f.solution_latex) if x]
+        latex = equations(x for x in (f"{f.latex} = 0", f.solution_latex) if x)
         heading = prose(f"{f.kind.value}: {f.meaning}".rstrip(": "))
-        out.add("\n".join(lines), "\n\n".join([heading, *latex]))
+        out.add("\n".join(lines), f"{heading}\n\n{latex}")
     if minors:
         tex = [r" \text{ and } ".join(f"{f.latex} = 0" for f in c.factors) for c in e.conditions]
         texts = [f"{c.kind.value}: {c.text}" for c in e.conditions]
-        out.add_lines("Singular positions", texts or ["none"], tex or [r"\text{none}"])
+        latex = equations(tex or [r"\text{none}"])
+        out.add_lines("Singular positions", texts or ["none"], latex)
     elif e.matrix is not None and not e.factors:
         out.add("It is a constant: there are no singular positions.")
-    return replace(e, text=out.text, latex=out.latex)
+    return out.of(e)

@@ -99,10 +99,10 @@ def singularity_map(
     limits = _limits(model, columns) if ranges is None else as_exact(ranges, (2, 2), "ranges")
     if not (limits[:, 0] < limits[:, 1]).all():
         raise InvalidValueError(f"ranges: expected the lower value first, got {limits.tolist()}.")
-    axes = [np.linspace(limits[k, 0], limits[k, 1], counts[k]) for k in range(2)]
+    first, second = (np.linspace(limits[k, 0], limits[k, 1], counts[k]) for k in range(2))
     grid = np.tile(q, (*counts, 1))
-    grid[..., columns[0]] = axes[0][:, None]
-    grid[..., columns[1]] = axes[1]
+    grid[..., columns[0]] = first[:, None]
+    grid[..., columns[1]] = second
     if factor is None:
         explanation = explain_singularities(model)
         values, label, unit = explanation.determinant(grid), "determinant", explanation.unit
@@ -114,9 +114,7 @@ def singularity_map(
     rows = model.table.joint_rows[columns]
     own = ["m" if model.table.sigma[row] == PRISMATIC else "rad" for row in rows]
     names = [str(model.table.names[row]) for row in rows]
-    first, second = axes
-    units = own[0], own[1], unit
-    pair = names[0], names[1]
+    pair, units = (names[0], names[1]), (own[0], own[1], unit)
     return SingularityMap(model.name, np.array(columns), pair, first, second, values, label, units)
 
 

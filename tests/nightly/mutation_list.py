@@ -500,7 +500,7 @@ MUTATIONS = [
         "-1 if sum(c < column for c in columns) % 2 else 1", "1",
         "tests/test_symbolic_singularities.py -k (random_arms or xarm6)"),
     Mutation("symbolic: chain", "a step towards the base has the other sign",
-        "class PolynomialChain(", "[-v for v in self.steps[near][1]]", "self.steps[near][1]",
+        "class PolynomialChain(", "[-v for v in step]", "step",
         "tests/test_symbolic.py -k pairs_of_frames"),
     Mutation("symbolic: formulas", "S S is half of the sum of two cosines",
         "def _product_to_sum(", 'plus = -half if kind == "S" and not cosine else half',
