@@ -25,6 +25,7 @@ S = vs.ServoStatus
 
 def test_three_dimensional_servoing_decays_exponentially():
     run = vs.servo(vs.task_3d(GOAL, gain=0.5), START, duration=4.0, step=0.05)
+    assert run.reason().startswith("The law was followed to the end: no proof of convergence.")
     for part in (run.error[:, :3], run.error[:, 3:]):
         size = np.linalg.norm(part, axis=1)
         assert size == pytest.approx(size[0] * np.exp(-0.5 * run.t), abs=1e-8)

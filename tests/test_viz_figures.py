@@ -311,7 +311,11 @@ def test_pose_path_has_equal_scales_frames_and_events():
     T = np.stack(
         [se3.from_rpy((0.1 * k, 0.0, 0.02 * k), (0.1 * k, 0.02 * k, 0.3)) for k in range(40)]
     )
-    (axes,) = viz.plot_pose_path(T, eventful_path(), frames=3, frame_size=0.1, unit="mm").axes
+    figure = viz.plot_pose_path(T, eventful_path(), frames=3, frame_size=0.1, unit="mm")
+    (axes,) = figure.axes
+    figure.draw_without_rendering()
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        assert axis.label.get_window_extent().y0 >= 0.0
     np.testing.assert_allclose(lines(axes, "path")[0].get_data_3d(), 1e3 * T[:, :3, 3].T)
     for k, name in enumerate("xyz"):
         for i, line in zip((0, 20, 39), lines(axes, f"tool {name}"), strict=True):

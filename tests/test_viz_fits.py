@@ -62,6 +62,8 @@ def test_residuals_are_those_of_the_result(calibrated):
             figure.axes[2 * k :], (part.before, part.after), words, strict=False
         ):
             np.testing.assert_allclose(data(axes, word), factor * values[:, k])
+            # the two sides have scales of their own
+            assert axes.yaxis.get_tick_params()["labelleft"]
     (part,) = measured_residuals(calibrated["many"])
     assert {3, 77} <= set(np.flatnonzero(part.outlier))
     after = viz.plot_calibration_residuals(calibrated["many"]).axes[1]

@@ -126,8 +126,9 @@ class ServoMotion(Result):
     def reason(self, i: Any = ()) -> str:
         """Sentence of the status, with the errors at both ends."""
         first, last = np.abs(self.error[[0, -1]]).max(axis=1)
-        words = f"Largest error {first:.3g} at the start, {last:.3g} at the end."
-        return f"{self.status.sentence} {words}"
+        sentence = "The law was followed to the end: no proof of convergence."
+        sentence = self.status.sentence if self.status else sentence
+        return f"{sentence} Largest error {first:.3g} at the start, {last:.3g} at the end."
 
 
 def servo(

@@ -122,11 +122,14 @@ def plot_calibration_residuals(result: CalibrationResult, **look: Unpack[Look]) 
             axes.locator_params(axis="y", nbins=5)
             axes.set_title(f"rms {np.sqrt(np.mean(y**2)):.3g} {symbol}", loc="right")
         places[0].set_ylabel(f"{row[0]} ({symbol})")
-    for axes in grid.flat:
+    for axes in grid[-1]:
         axes.set(xlabel="configuration", xlim=(0.0, count + 1.0))
-        axes.label_outer()
-        for part in parts[1:]:
+    for k, part in enumerate(parts if len(parts) > 1 else ()):
+        for axes in grid.flat if k else ():
             axes.axvline(part.blocks[0] + 0.5, color=PALE, linewidth=0.8)
+        name, place = part.measurement.name, grid[0, 0].get_xaxis_transform()
+        if 0.065 * len(name) < 3.0 * len(part.blocks) / count:  # inches
+            grid[0, 0].text(part.blocks[0] + 0.7, 0.98, name, transform=place, va="top")
     return style.finished(figure, look, [side[-1] for side in _SIDES])
 
 

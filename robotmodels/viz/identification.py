@@ -247,7 +247,8 @@ def plot_identification_standard_errors(
     axes.axhline(100.0 * WEAK, color=INK, label="_limit", **DASHED)
     axes.set(yscale="log", ylim=(low, high), ylabel="relative standard error (%)")
     style.plain_logarithmic(axes.yaxis)
-    axes.set_xticks(x, [found.names[k] for k in order], rotation=90)
+    size = min(7.5, 350.0 / max(len(x), 1))  # points: names do not touch each other
+    axes.set_xticks(x, [found.names[k] for k in order], rotation=90, fontsize=size)
     axes.grid(False, axis="x")
     return style.finished(figure, look, ("determined", "poorly determined"))
 

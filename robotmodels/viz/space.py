@@ -48,6 +48,6 @@ def space(
         axis.labelpad = 2.0
         axes.tick_params(axis=name, pad=-1.0)
         axes.set(**{f"{name}lim": (middle - 0.5 * edge, middle + 0.5 * edge)})
-    axes.set_box_aspect(edges, zoom=0.8)
+    axes.set_box_aspect(edges, zoom=0.7)
     axes.patch.set_visible(False)  # it would hide its neighbours
     return axes
