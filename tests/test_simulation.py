@@ -271,6 +271,9 @@ def test_maps_over_joints():
         assert dynamics_map(model, j, samples=2).ranges[0] == pytest.approx(ends)
     with pytest.raises(InvalidValueError, match="whole numbers"):
         dynamics_map(arm, (1, 2), samples=(3, 2.5))
+    for joints in ([[0, 1]], [0.0], [0, 0], 6, -1, []):
+        with pytest.raises(InvalidValueError, match="joints"):
+            dynamics_map(arm, joints)
 
 
 # --- feedback ----------------------------------------------------------------------------------

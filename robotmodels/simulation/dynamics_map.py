@@ -86,8 +86,8 @@ def dynamics_map(
     check_model(model)
     n, columns = model.n, np.atleast_1d(np.asarray(joints))
     k = columns.size
-    known = columns.dtype.kind in "iu" and len({*columns.tolist()} & {*range(n)}) == k
-    if columns.shape not in ((1,), (2,)) or not known:
+    numbers = columns.dtype.kind in "iu" and columns.shape in ((1,), (2,))
+    if not numbers or len({*columns.tolist()} & {*range(n)}) < k:
         raise InvalidValueError(
             f"joints: expected one or two different joints, numbers from 0 to {n - 1}, got "
             f"{joints!r:.60}."
