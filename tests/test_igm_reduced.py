@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import robotmodels as rm
+from robotmodels.igm import search
 
 WHOLE, POINT, POINTING, PLANE = "111111", "111000", "111110", "110001"
 # joint kinds, and which joints are parallel to the one before
@@ -231,6 +232,23 @@ def test_a_pose_made_by_the_direct_model_is_never_out_of_reach(seed):
     unreachable = [rm.IGMStatus.TOO_FAR, rm.IGMStatus.TOO_NEAR]
     assert not np.isin(found.status, [*unreachable, rm.IGMStatus.ORIENTATION_NOT_AVAILABLE]).any()
     assert (found.count > 0).sum() >= 149
+
+
+def test_a_self_motion_met_by_most_starts_is_completed_a_few_times(monkeypatch):
+    rows = zip([0, 90, 90, 180, 0, 90], [0, 0.2, 0.32, 0.37, 0.18, 0], strict=True)
+    table = rm.DHTable.from_rows(
+        [{"sigma": int(j == 0), "alpha": a, "d": d, "r": 0.17 * (j == 1)}
+         for j, (a, d) in enumerate(rows)],
+        degrees=True,
+    )  # fmt: skip
+    model, calls = rm.RobotModel.from_table(table), []
+    monkeypatch.setattr(
+        search, "completed", lambda *x, f=search.completed: calls.append(1) or f(*x)
+    )
+    found = rm.igm(model, rm.dgm(model, [0, -2, 1, 1, 0, 0]))
+    assert found.status == rm.IGMStatus.REACHED_FAMILY
+    assert found.count == 2
+    assert 0 < len(calls) < 100
 
 
 @pytest.mark.parametrize("word", ["lab_trr", "xarm5", "RRR", "PRR", "RRRRR/23"])

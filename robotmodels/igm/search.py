@@ -31,6 +31,7 @@ PATIENCE = 0.9  # share of the cost left after five steps above which a start is
 SINGULAR = 1e-6  # singular values of the Jacobian beside the largest that count as zero
 CLOSE = 0.05  # the same below which a second root may be close
 BESIDE = (0.01, 0.03, 0.1, 0.3)  # distances along the null direction at which it is looked for
+REPEATS = 20  # singular rows in a row without a new member after which the others are left out
 FOLD = 1e-3  # singular configurations closer than this may come from one root
 
 
@@ -222,23 +223,33 @@ def _singular_pose(
     chain, members = wanted.chain, no_postures(1, 0, wanted.chain.k)
     order = rows[np.argsort(found.residual[0, rows], kind="stable")]
     for place, i in enumerate(order):
-        for j in order[place + 1 :]:
-            if found.valid[0, i] and found.valid[0, j]:
-                gap = difference(chain.sigma, found.q[0, j], found.q[0, i])
-                # what lies between two copies of one root meets the pose as well
-                between = (found.q[0, i] + 0.5 * gap)[None]
-                if np.abs(gap).max() < FOLD and wanted.met(U, between, tolerances)[1][0]:
-                    found.valid[0, j], found.double[0, i] = False, True
-    for i in rows[found.valid[0, rows]]:
+        if not found.valid[0, i]:
+            continue
+        others = order[place + 1 :]
+        gaps = difference(chain.sigma, found.q[0, others], found.q[0, i])
+        for k in np.flatnonzero((np.abs(gaps).max(axis=1) < FOLD) & found.valid[0, others]):
+            # what lies between two copies of one root meets the pose as well
+            between = (found.q[0, i] + 0.5 * gaps[k])[None]
+            if wanted.met(U, between, tolerances)[1][0]:
+                found.valid[0, others[k]], found.double[0, i] = False, True
+    rows = rows[found.valid[0, rows]]
+    goals, nothing_new = np.repeat(U, len(rows), axis=0), 0
+    null = _null_projectors(wanted, goals, found.q[0, rows], ())
+    for i in rows[null.any(axis=(1, 2))]:
+        if nothing_new == REPEATS:  # the others are taken for members of the same self-motions
+            found.valid[0, i] = False
+            continue
         q, free = completed(wanted, U, found.q[0, i], reference)
         if free.any():
             found.valid[0, i] = False
             part = collected(wanted, U, q, np.zeros(len(q), np.int64), tolerances)
             part.free[0], part.family[0] = part.valid[0][:, None] & free, part.valid[0]
             # most rows lead to members that are known: merged at once they stay few
+            before = members.valid.sum()
             members = side_by_side([members, part]).merge(chain.sigma)
+            nothing_new = nothing_new + 1 if members.valid.sum() == before else 0
         else:
-            found.double[0, i] |= _null_projectors(wanted, U, found.q[:, i], ()).any()
+            found.double[0, i] = True
     return side_by_side([members, found]).merge(chain.sigma)
 
 
