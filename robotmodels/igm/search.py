@@ -176,7 +176,9 @@ def solutions_from(
     q = found.q[n, s]
     _, sizes, rows = np.linalg.svd(wanted.jacobians(U[n], q))
     if sizes.shape[1] == wanted.chain.k:
-        close = np.flatnonzero(sizes[:, -1] < CLOSE * sizes[:, 0])
+        # zero singular values are of double roots and self-motions, which have no other root there
+        least, most = sizes[:, -1], sizes[:, 0]
+        close = np.flatnonzero((least > SINGULAR * most) & (least < CLOSE * most))
         distances = np.array(BESIDE + tuple(-d for d in BESIDE))
         beside = q[close, None] + distances[:, None] * rows[close, None, -1]
         more = np.repeat(n[close], len(distances))
