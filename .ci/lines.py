@@ -2,8 +2,8 @@
 
     python .ci/lines.py [--check]
 
-Whole Python files are counted as they stand. ``--check`` ends with 1 where a package is more than
-15 % above its budget and above the lines that `ACCEPTED` states for it.
+Whole Python files are counted as they stand. ``--check`` ends with 1 where a package or folder is
+more than 15 % above its budget and above the lines that `ACCEPTED` states for it.
 """
 
 from __future__ import annotations
@@ -22,8 +22,14 @@ BUDGETS = {
 }  # fmt: skip
 """Lines of a package, or of several together; the rest shares `REST`."""
 REST = 6500
-ACCEPTED: dict[str, int] = {}
-"""Packages above their budget, and the lines they may have: they only shrink."""
+FOLDERS = {"robotmodels": 71000, "tests": 32000, "benchmarks": 2500}
+ACCEPTED = {
+    "igm": 11000, "identification": 8170, "calibration": 7910, "logs": 2010,
+    "minimal_parameters": 2770, "viz": 5490, "trajectories": 5650, "performance": 3700,
+    "loops": 1680, "parallel": 2990, "control": 1860, "visual_servoing": 2300, "flexible": 3090,
+    "export": 1600, "all other packages": 7490, "robotmodels": 89520, "benchmarks": 3280,
+}  # fmt: skip
+"""What is above its budget, and the lines it may have: these numbers only shrink."""
 
 
 def lines(path: Path) -> tuple[int, int]:
@@ -52,13 +58,11 @@ def main() -> None:
         rows.append((group, *total([rooms[name] for name in names]), budget))
     rest = [rooms[name] for name in rooms if name not in named]
     rows.append(("all other packages", *total(rest), REST))
+    rows += [(name, *lines(ROOT / name), budget) for name, budget in FOLDERS.items()]
     for name, count, files, budget in rows:
         print(f"{name:<50}{count:>8}{files:>6} files, budget {budget}")
         if count > max(1.15 * budget, ACCEPTED.get(name, 0)):
             wrong.append(f"{name}: {count} lines, budget {budget}")
-    for folder in (package, ROOT / "tests", ROOT / "benchmarks"):
-        count, files = lines(folder)
-        print(f"{folder.name:<50}{count:>8}{files:>6} files")
     if check and wrong:
         sys.exit("\n".join(wrong))
 
