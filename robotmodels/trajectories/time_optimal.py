@@ -90,8 +90,9 @@ def time_optimal(
     (collocation); `TimedPath.reason` lists where torques between the points exceed their limits by
     more than 2 %. With ``both_ends`` they are limited at both ends and, by narrower limits where
     needed, between them to 1.001, but for moments where dry friction changes its sign. Velocities
-    are limited between the points too, to some parts in ten thousand; on curved paths accelerations
-    may exceed their limits there by some parts in a thousand, less with more points.
+    are limited at nine places between the points too, on smooth paths to some parts in ten
+    thousand; accelerations may exceed their limits there by some parts in a thousand. Where a path
+    turns sharply within one interval both may exceed them by far: take more points.
 
     Parameters
     ----------
