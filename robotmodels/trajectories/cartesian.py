@@ -78,7 +78,7 @@ def cartesian_trajectory(
     """
     path = arc(se3.as_single_pose(T0, "T0"), se3.as_single_pose(T1, "T1"))
     along = along_line(law, 0.0, 1.0, 1.0, None)
-    s = along.q(np.linspace(0.0, 1.0, as_count(N, "N", 0)))
+    s = along.q(np.linspace(0.0, 1.0, as_count(N, "N", 0, 10**7)))
     s[1:][-1:] = 1.0  # the last pose is met to the last digit
     return path.poses(s)
 

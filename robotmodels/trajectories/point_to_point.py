@@ -199,7 +199,7 @@ def joint_trajectory(
     (array([0.5, 0. ]), (5, 2))
     """
     if not isinstance(N, (list, tuple)) and np.ndim(N) == 0:  # type: ignore[arg-type]
-        t = np.linspace(0.0, 1.0, as_count(N, "N", 0))  # type: ignore[arg-type]
+        t = np.linspace(0.0, 1.0, as_count(N, "N", 0, 10**7))  # type: ignore[arg-type]
     else:
         t = as_floats(N, "N")  # type: ignore[arg-type]
         if t.ndim != 1 or (t[1:] < t[:-1]).any():
