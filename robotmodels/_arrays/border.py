@@ -143,7 +143,7 @@ def as_each(
 
 
 def as_flag(value: Any, name: str) -> bool:
-    """A choice; a word such as "no" is none."""
+    """True or False; any other value is refused."""
     if not isinstance(value, (bool, np.bool_)):
         raise InvalidValueError(f"{name}: expected True or False, got {value!r:.60}.")
     return bool(value)

@@ -64,6 +64,7 @@ def with_contradictions(
 
 
 def _named(m: Any) -> str:
+    """A known distance by its name and its two points."""
     return f"{m.name} {m.point} to {m.other}"
 
 

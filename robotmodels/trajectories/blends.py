@@ -11,8 +11,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_floats
-from ..errors import InvalidValueError, ShapeError
+from .._arrays import Array, as_each
+from ..errors import InvalidValueError
 from .limits import ROUNDING, MotionLimits, checked_limits, least_shown, limits_along, slowed
 from .motions import PiecewisePolynomial
 from .splines import as_points
@@ -70,9 +70,9 @@ def blended_lines(
         T = full_speed(step, bounds)
         T, tb = schedule(T, lambda T: _least_blends(step, T, bounds, smooth))
     else:
-        T = _spread(segment_times, m - 1, "segment_times")
+        T = as_each(segment_times, m - 1, "segment_times", 0.0, finite=True)
         if blend_times is not None:
-            tb = _spread(blend_times, m, "blend_times")
+            tb = as_each(blend_times, m, "blend_times", 0.0, finite=True)
         elif bounds is not None:
             tb = _least_blends(step, T, bounds, smooth)
         else:
@@ -163,12 +163,3 @@ def joined(q: Array, step: Array, T: Array, tb: Array, smooth: bool) -> Piecewis
     c[1::2, 0], c[1::2, 1] = q[:-1] + 0.5 * v * blend[:-1], v * h[1::2, None]
     breaks = np.concatenate(((0.0,), np.cumsum(h)))
     return PiecewisePolynomial(breaks[None], c, h[None])
-
-
-def _spread(value: ArrayLike, count: int, name: str) -> Array:
-    times = as_floats(value, name)
-    if times.shape not in ((), (count,)):
-        raise ShapeError(f"{name}: expected one number or shape ({count},), got {times.shape}.")
-    if (times < 0.0).any():
-        raise InvalidValueError(f"{name}: expected times of at least 0, got {times.min():g}.")
-    return np.broadcast_to(times, count)

@@ -66,7 +66,7 @@ class Event(NamedTuple):
 
     def happens(self, scene: _Scene) -> bool:
         """Whether it holds in all configurations of a scene."""
-        return _none(self.residual(scene, *self.places))
+        return _is_zero(self.residual(scene, *self.places))
 
 
 class ArmGeometry:
@@ -89,12 +89,12 @@ class ArmGeometry:
             W = _common(usual, b, c)
             if not np.isnan(W).any():
                 self.point = f"the point where axes {numbers[b]} and {numbers[c]} meet"
-                if _none(np.cross(W - usual.o[a], usual.z[a])):
+                if _is_zero(np.cross(W - usual.o[a], usual.z[a])):
                     self.point = "the wrist centre"
                 self.meeting, usual = (b, c), usual._replace(W=W)
         self.turning = [k for k, turns in enumerate(self.turns) if turns]
         pairs = combinations(self.turning, 2)
-        self.parallel = [pair for pair in pairs if _none(_same_direction(usual, *pair))]
+        self.parallel = [pair for pair in pairs if _is_zero(_same_direction(usual, *pair))]
         self.events = [e for e in self._candidates() if not e.happens(usual)]
 
     def _scene(self, q: Array) -> _Scene:
@@ -175,7 +175,7 @@ def _nearest_first(places: Any) -> list[tuple[int, int]]:
     return sorted(combinations(places, 2), key=lambda pair: pair[1] - pair[0])
 
 
-def _none(x: Array) -> bool:
+def _is_zero(x: Array) -> bool:
     """Whether all is zero; NaN is not."""
     return bool(np.abs(x).max() <= _TOLERANCE)
 
@@ -188,7 +188,7 @@ def _common(s: _Scene, a: int, b: int) -> Array:
     """The point where two axes meet in every configuration; else NaN."""
     normal, between = np.cross(s.z[a], s.z[b]), s.o[b] - s.o[a]
     square = _dot(normal, normal)
-    if square.min() < 1e-12 or not _none(_dot(between, normal)):
+    if square.min() < 1e-12 or not _is_zero(_dot(between, normal)):
         return np.full(s.W.shape, np.nan)
     way = _dot(np.cross(between, s.z[b]), normal) / square
     return s.o[a] + way[:, None] * s.z[a]
